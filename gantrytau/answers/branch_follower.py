@@ -65,10 +65,16 @@ def _with_jacobian(residual: ca.Function) -> tuple[list[ca.SX], list[ca.SX]]:
     return [y, q], [ca.densify(ca.jacobian(residual(y, q), y))]
 
 
-def residual_along(residual: ca.Function, begin: ca.DM, rows: ca.DM, columns: ca.DM) -> ca.Function:
-    """(z, s, b) -> residual, its Jacobian by z, its derivative by s; z are the unknowns in their sizes."""
-    z, s, end = ca.SX.sym("z", columns.numel()), ca.SX.sym("s"), ca.SX.sym("end", begin.numel())
-    f = residual(z * columns, begin + s * (end - begin)) / rows
+def residual_along(residual: ca.Function, begin: ca.DM | None, rows: ca.DM, columns: ca.DM) -> ca.Function:
+    """(z, s, b) -> residual, its Jacobian by z, its derivative by s; z are the unknowns in their sizes.
+
+    begin: of the way; None where it stands below b, (2 k,).
+    """
+    k = residual.numel_in(1)
+    z, s = ca.SX.sym("z", columns.numel()), ca.SX.sym("s")
+    end = ca.SX.sym("end", k if begin is not None else 2 * k)
+    first = end[k:] if begin is None else begin
+    f = residual(z * columns, first + s * (end[:k] - first)) / rows
     parts = [ca.densify(f), ca.densify(ca.jacobian(f, z)), ca.densify(ca.jacobian(f, s))]
     return ca.Function("along", [z, s, end], parts, {"cse": True})
 

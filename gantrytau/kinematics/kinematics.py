@@ -18,7 +18,7 @@ from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.kinematics.model_functions import ModelFunctions, home_of
+from gantrytau.kinematics.model_functions import ModelFunctions, home_of, limits_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
 from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose
 from gantrytau.kinematics.rods.rod_geometry import geometry_of
@@ -84,13 +84,7 @@ class Kinematics(Record):
     @property
     def limits(self) -> np.ndarray:
         """Bounds that the model declares for its actuator coordinates, (n, 2); infinite where it declares none."""
-        found = np.tile([-np.inf, np.inf], (len(self.joints), 1))
-        for row, name in enumerate(self.joints):
-            variable = self.dae.flat.find(name)
-            for column, bound in enumerate((variable.min, variable.max) if variable else ()):
-                if bound is not None:
-                    found[row, column] = self.dae.number(bound[0])
-        return found
+        return limits_of(self.dae, self.joints)
 
     def ik(self, r: Any, R: Any = None) -> np.ndarray:
         """Actuator coordinates q (N, n) of poses; (n,) for one.

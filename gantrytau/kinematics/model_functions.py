@@ -5,6 +5,7 @@ coordinates of its pose, of the position and then of elements 1 to 3 of the quat
 start. The rest of a pose follows from these; where another rest is asked for, the pose is out of reach.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,7 +44,7 @@ class ModelFunctions:
         x = self._coordinates(r, R)
         q = self._joints_of(x)
         if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
-            there, turned = self._pose_of(x)
+            there, turned = self._pose_of(np.where(np.isfinite(q), x, np.nan))
             with np.errstate(invalid="ignore"):
                 missed = np.abs(there - r).max(axis=1)
                 if R is not None:
@@ -77,7 +78,7 @@ class ModelFunctions:
         by_joints = solved(self._slopes_of(x), np.broadcast_to(np.eye(count), (len(x), count, count)))
         if self.places == (0, 1, 2):
             return by_joints
-        moves = self._following.slopes(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
+        moves = self._following.slopes_around(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
         if R is None:  # as then the joints do not choose it
             return self._in_reach(moves[:, :3] @ by_joints, r, R)
         if count == 6:
@@ -96,13 +97,30 @@ class ModelFunctions:
 
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each, matrices column after column."""
-        found = self.dae.array_function(self._given, names)(*self._arguments(self._coordinates(r, R)))
+        found = self.dae.array_function(self._given, names).around(*self._arguments(self._coordinates(r, R)))
         return [self._in_reach(each, r, R) for each in found]
 
     def _in_reach(self, found: np.ndarray, r, R) -> np.ndarray:
         """The same, NaN where the rest of a pose is not what its coordinates make it."""
         if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
             found[np.isnan(self.ik(r, R)[0]).any(axis=1)] = np.nan
+        return found
+
+    @cached_property
+    def _turns(self) -> dict[int, float]:
+        """The middle of the turn in which an angle is told, by column: of its limits, else home.
+
+        The angle of a screw, whose turn does not bring the tool back, is not among them.
+        """
+        found = {}
+        for k, (low, high) in enumerate(limits_of(self.dae, self.joints)):
+            variable = self.dae.flat.find(self.joints[k])
+            if variable is None or variable.unit != "rad":
+                continue
+            q = np.vstack([self.home.q, self.home.q + 2 * np.pi * np.eye(len(self.home.q))[k]])
+            here, there = np.hstack(self._forward(*q.T))
+            if not np.isfinite(there).all() or np.abs(there - here).max() <= 1e-9 * np.abs(here).max():
+                found[k] = (low + high) / 2 if np.isfinite(high - low) else self.home.q[k]
         return found
 
     @property
@@ -169,14 +187,20 @@ class ModelFunctions:
             with np.errstate(invalid="ignore"):
                 scalar = np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
             return x[:, :3], of_quaternions(np.column_stack([scalar, x[:, 3:]]))
-        return self._posed(self._following(*self._arguments(x)))
+        return self._posed(self._following.around(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
-        return _whole(np.hstack(self._inverse(*self._arguments(x))))
+        return self._within_a_turn(_whole(np.hstack(self._inverse.around(*self._arguments(x)))))
+
+    def _within_a_turn(self, q: np.ndarray) -> np.ndarray:
+        """Angles at most half a turn from home, or within their limits: ways around an axis end a turn apart."""
+        for k, middle in self._turns.items():
+            q[:, k] -= 2 * np.pi * np.round((q[:, k] - middle) / (2 * np.pi))
+        return q
 
     def _slopes_of(self, x: np.ndarray) -> np.ndarray:
         """Slopes of the joints by the coordinates of poses, (N, n, n)."""
-        return _whole(self._inverse.slopes(*self._arguments(x)))
+        return _whole(self._inverse.slopes_around(*self._arguments(x)))
 
     @cached_property
     def _forward(self) -> ArrayFunction:
@@ -230,6 +254,17 @@ class ModelFunctions:
         if R is None:
             return r[:, list(self.places)]
         return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
+
+
+def limits_of(dae: Dae, joints: Sequence[str]) -> np.ndarray:
+    """Bounds that a model declares for coordinates, (n, 2); infinite where it declares none."""
+    found = np.tile([-np.inf, np.inf], (len(joints), 1))
+    for row, name in enumerate(joints):
+        variable = dae.flat.find(name)
+        for column, bound in enumerate((variable.min, variable.max) if variable else ()):
+            if bound is not None:
+                found[row, column] = dae.number(bound[0])
+    return found
 
 
 def _whole(found: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from gantrytau.answers.causality import composed, function
 from gantrytau.answers.function_through import Question
 from gantrytau.answers.many_points.array_program import NotForArrays
+from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.answers.many_points.point_by_point import PointByPoint
 from gantrytau.answers.many_points.through_blocks import ThroughBlocks
 from gantrytau.compiler.blocks.solution import SolvedBlocks
@@ -57,6 +58,19 @@ class _Arrays:
                 whole[:, doubtful] = part
         return found, tears, doubtful
 
+    def around(self, q: np.ndarray) -> list[np.ndarray]:
+        """Results at arguments to which the straight way from the start does not lead, by the ways that others took."""
+        return self.second.targets(q, self.grown(q))[0]
+
+    def slopes_around(self, q: np.ndarray) -> np.ndarray:
+        """Their slopes."""
+        return self.second.slopes(q, self.grown(q))
+
+    @cached_property
+    def grown(self) -> GrownBranch:
+        """The branch as far as it goes."""
+        return GrownBranch(self.second)
+
     @cached_property
     def first(self) -> ThroughBlocks:
         """The way through blocks that are quick."""
@@ -92,6 +106,38 @@ class ArrayFunction:
     def slopes(self, *arguments: np.ndarray) -> np.ndarray:
         """Slopes of all results, below each other, by all arguments, (N, m, k)."""
         return self._everywhere(self._checked(arguments), self._slopes_of_some)[0]
+
+    def around(self, *arguments: np.ndarray) -> list[np.ndarray]:
+        """Results, where the straight way from the start ends by ways around: as far as the branch goes."""
+        q = self._checked(arguments)
+        found = self._everywhere(q, self._some)
+        return self._completed(q, found, lambda arrays, rows: [x.T for x in arrays.around(rows)])
+
+    def slopes_around(self, *arguments: np.ndarray) -> np.ndarray:
+        """Slopes of these, (N, m, k)."""
+        q = self._checked(arguments)
+        found = self._everywhere(q, self._slopes_of_some)
+        return self._completed(q, found, lambda arrays, rows: [arrays.slopes_around(rows)])[0]
+
+    def _completed(
+        self,
+        q: np.ndarray,
+        found: list[np.ndarray],
+        around: Callable[[_Arrays, np.ndarray], list[np.ndarray]],
+    ) -> list[np.ndarray]:
+        """With rows that are NaN found by ways around, where unknowns are followed along branches at all."""
+        lost = np.isfinite(q).all(axis=1) & ~_finite(found)
+        if lost.any() and self._grows:
+            for whole, part in zip(found, around(self._arrays, q[lost].T), strict=True):
+                whole[lost] = part
+        return found
+
+    @cached_property
+    def _grows(self) -> bool:
+        try:
+            return self._arrays.second.leads
+        except NotForArrays:
+            return False
 
     def _checked(self, arguments: Sequence[np.ndarray]) -> np.ndarray:
         """All arguments beside each other, (N, k)."""
@@ -143,6 +189,11 @@ class ArrayFunction:
     @cached_property
     def _arrays(self) -> _Arrays:
         return composed(self._dae, self.given, self.find, _through, _open)
+
+
+def _finite(found: Sequence[np.ndarray]) -> np.ndarray:
+    """Rows in which all results are numbers, (N,)."""
+    return np.all([np.isfinite(x).all(axis=tuple(range(1, x.ndim))) for x in found], axis=0)
 
 
 def _through(

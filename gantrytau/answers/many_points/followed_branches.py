@@ -5,8 +5,9 @@ expressions of which NumPy computes one instruction for all points; where the wa
 pivots that are chosen by value for each point, so that no answer is lost where one of the others vanishes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -27,17 +28,30 @@ ONWARD = 0.1  # of what is left of the way, the first trial after pivots are cho
 
 @dataclass(frozen=True, eq=False)
 class FollowedBranch:
-    """Unknowns y (n,) of a block; residual: (y, q) -> f (n,), an SX function; start: y where q is `begin`, both columns."""
+    """Unknowns y (n,) of a block; residual: (y, q) -> f (n,), an SX function; start: y where q is `begin`, both columns.
+
+    anywhere: each point has a start of its own, and where it lies stands below `end`, (2 k, N).
+    """
 
     residual: ca.Function
     start: np.ndarray
     begin: np.ndarray
+    anywhere: bool = False
 
-    def __call__(self, end: np.ndarray) -> np.ndarray:
+    def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Y (n, N) at `end` (k, N), each led from another point of the branch, start (n, N) at begin (k, N)."""
+        return self._anywhere(np.vstack([end, begin]), start)
+
+    @cached_property
+    def _anywhere(self) -> "FollowedBranch":
+        return replace(self, anywhere=True)
+
+    def __call__(self, end: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
         """Y (n, N) at `end` (k, N); NaN where the branch does not lead there."""
         rows, _ = self.units
         y = np.full((len(self.start), end.shape[1]), np.nan)
-        z = np.repeat((self.start / self.units[1])[:, None], end.shape[1], axis=1)
+        start = np.repeat(self.start[:, None], end.shape[1], axis=1) if start is None else start
+        z = start / self.units[1][:, None]
         way = np.ones((2, end.shape[1]))
         self._along(self._trial, way, z, end)
         late = np.flatnonzero(way[0] > 0)
@@ -103,12 +117,24 @@ class FollowedBranch:
     @cached_property
     def _here(self) -> ca.Function:
         """(z, s, b) -> residual, its Jacobians by z and s."""
-        return one.residual_along(self.residual, ca.DM(self.begin), *map(ca.DM, self.units))
+        begin = None if self.anywhere else ca.DM(self.begin)
+        return one.residual_along(self.residual, begin, *map(ca.DM, self.units))
+
+    def _way(self, end: Any) -> Any:
+        """From where the way begins to where it ends, as numbers (k, N) or symbols (k,)."""
+        k = len(self.begin)
+        begin = end[k:] if self.anywhere else self.begin[:, None]
+        return end[:k] - begin
+
+    @property
+    def _end(self) -> ca.SX:
+        return ca.SX.sym("end", len(self.begin) * (2 if self.anywhere else 1))
 
     @cached_property
     def order(self) -> list[tuple[int, int]]:
         """Pivots that are good at the start, as (row, column)."""
-        _, matrix, _ = self._here(ca.DM(self.start / self.units[1]), 0, ca.DM(self.begin))
+        there = np.tile(self.begin, 2) if self.anywhere else self.begin
+        _, matrix, _ = self._here(ca.DM(self.start / self.units[1]), 0, ca.DM(there))
         order = order_of_pivots(np.array(matrix))
         if order is None:
             raise NotForArrays(f"{self.residual.name()} is singular at the start")
@@ -121,14 +147,14 @@ class FollowedBranch:
         Matrices are eliminated in the order that is good at the start.
         """
         n = len(self.start)
-        way, z, end = ca.SX.sym("way", 2), ca.SX.sym("z", n), ca.SX.sym("end", len(self.begin))
+        way, z, end = ca.SX.sym("way", 2), ca.SX.sym("z", n), self._end
         left, h = way[0], way[1]
         f, before, slope = self._here(z, 1 - left, end)
         step = -eliminated(before, f + h * slope, self.order)
         f, after, _ = self._here(z + step, 1 - left + h, end)
         both = eliminated(after, ca.horzcat(f, before), self.order)
         pivots = one.pivots_of(both[:, 1:])
-        usual = ca.sumsqr(step) + h**2 * ca.dot(self._reach, (end - ca.DM(self.begin)) ** 2)
+        usual = ca.sumsqr(step) + h**2 * ca.dot(self._reach, self._way(end) ** 2)
         sizes = ca.vertcat(ca.sumsqr(both[:, 0]), usual, ca.sumsqr(z))
         results = [step - both[:, 0], sizes, ca.vertcat(*pivots)]
         return ArrayProgram(ca.Function("trial", [way, z, end], results, {"cse": True}))
@@ -141,7 +167,7 @@ class FollowedBranch:
         correction, n = -both[:, :, 0].T, len(z)
         (pivots,) = self._pivots(both[:, :, 1:].transpose(2, 1, 0).reshape(n * n, -1))
         sizes = [np.sum(x * x, axis=0) for x in (correction, step, z)]
-        sizes[1] += way[1] ** 2 * (np.array(self._reach).T @ (end - self.begin[:, None]) ** 2)[0]
+        sizes[1] += way[1] ** 2 * (np.array(self._reach).T @ self._way(end) ** 2)[0]
         return step + correction, sizes, pivots
 
     def _matrices(self, z: np.ndarray, s: np.ndarray, end: np.ndarray):
@@ -160,7 +186,7 @@ class FollowedBranch:
 
     @cached_property
     def _newton(self) -> ArrayProgram:
-        z, end = ca.SX.sym("z", len(self.start)), ca.SX.sym("end", len(self.begin))
+        z, end = ca.SX.sym("z", len(self.start)), self._end
         f, matrix, _ = self._here(z, 1, end)
         step = -eliminated(matrix, f, self.order)
         return ArrayProgram(ca.Function("newton", [z, end], [step], {"cse": True}))
@@ -172,7 +198,7 @@ class FollowedBranch:
     @cached_property
     def _errors(self) -> ArrayProgram:
         """(y, end) -> the square of the residual in the sizes of the terms of its equations."""
-        y, end = self.residual.sx_in()
-        f = self.residual(y, end)
+        y, end = self.residual.sx_in()[0], self._end
+        f = self.residual(y, end[: len(self.begin)])
         terms = ca.vertcat(*(ca.if_else(t > 0, t, 1.0) for t in term_sizes(ca.densify(f).elements())))
         return ArrayProgram(ca.Function("errors", [y, end], [ca.sumsqr(f / terms)], {"cse": True}))

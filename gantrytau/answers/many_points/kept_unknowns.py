@@ -49,6 +49,10 @@ class ReducedBranch:
             y[:, doubtful] = self.whole(end[:, doubtful])
         return y
 
+    def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """See `FollowedBranch.beside`."""
+        return self.whole.beside(end, begin, start)
+
     @cached_property
     def _judged(self) -> ArrayProgram:
         """(y, end) -> the largest residual in sizes of rows; pivots of the Jacobian beside those at the start."""

@@ -11,7 +11,7 @@ from gantrytau.answers.implicit_blocks import SINGULAR, linear_parts, picked, wh
 from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArrays
 from gantrytau.answers.many_points.elimination import solved
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
-from gantrytau.answers.many_points.kept_unknowns import reduced
+from gantrytau.answers.many_points.kept_unknowns import ReducedBranch, reduced
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.language.piecewise import switched
 
@@ -40,6 +40,10 @@ class LinearSolution:
             both[~(np.sum(both[:, :, 1] ** 2, axis=1) <= SINGULAR**-2)] = np.nan
         return (both[:, :, 0] / self._columns).T
 
+    def beside(self, known: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """The same: linear equations have one solution, from wherever it is led."""
+        return self(known)
+
 
 class ThroughBlocks:
     """Targets through blocks as they are solved; trusted: expressions that hold where the closed forms can be trusted."""
@@ -49,11 +53,16 @@ class ThroughBlocks:
         trusted = [] if careful else [m > 0 for m in margins if not m.is_constant()]
         q, tears = ca.vertcat(*question.arguments), ca.vertcat(ca.SX(0, 1), *blocks.tears)
         self._start = np.array(question.start()).ravel()
-        self._steps: list[tuple[list[int], Callable[[np.ndarray], np.ndarray]]] = []
+        self._steps: list[tuple[list[int], LinearSolution | FollowedBranch | ReducedBranch]] = []
+        self._places: list[tuple[int, int]] = []  # of the unknowns of each step behind the arguments
         near = _around(self._start)
         before, place = ca.SX(0, 1), 0
+        self.count = len(self._start)  # of arguments
+        self.leads = False  # whether unknowns are followed along branches
+        self.start = np.concatenate([self._start, [start[leaf.name()] for leaf in tears.elements()]])
         for block in blocks.implicit:
             begin, place = place, place + len(block.tears)
+            self._places.append((len(self._start) + begin, len(self._start) + place))
             y, every, residual = ca.vertcat(*block.tears), ca.vertcat(q, before), residuals[begin:place]
             used = which_stand_in([residual, extents[begin:place]], every)
             known = picked(every, used)
@@ -61,7 +70,7 @@ class ThroughBlocks:
                 raise NotForArrays("equations that switch, in a block without closed form")
             if block.scales is not None:
                 parts = linear_parts(residual, extents[begin:place], block.scales, y, known)
-                step: Callable[[np.ndarray], np.ndarray] = LinearSolution(parts)
+                step = LinearSolution(parts)
             else:
                 function = ca.Function("residual", [y, known], [residual], {"cse": True})
                 numbers = np.array([start[leaf.name()] for leaf in tears[:place].elements()])
@@ -69,6 +78,7 @@ class ThroughBlocks:
                 branch = FollowedBranch(function, numbers[begin:], known_at_start)
                 step = reduced(branch, branch(near[used]))
             self._steps.append((used, step))
+            self.leads = self.leads or block.scales is None
             before = ca.vertcat(before, y)
             near = np.vstack([near, step(near[used])])
         everything = [q, tears]
@@ -82,6 +92,13 @@ class ThroughBlocks:
         known = q
         for used, step in self._steps:
             known = np.vstack([known, step(known[used])])
+        return known[len(q) :]
+
+    def tears_beside(self, q: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """The same (n, N), each led from another point: there (k + n, N), arguments and unknowns on the branch."""
+        known = q
+        for (used, step), (first, end) in zip(self._steps, self._places, strict=True):
+            known = np.vstack([known, step.beside(known[used], there[used], there[first:end])])
         return known[len(q) :]
 
     def targets(self, q: np.ndarray, tears: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
