@@ -1,8 +1,8 @@
-"""Laws of friction over a speed, the same along an axis and about it: forces in N over m/s, torques in N.m over rad/s."""
+"""Laws of friction over a speed and of stops, the same along an axis (N, m, m/s) and about it (N.m, rad, rad/s)."""
 
 from typing import Any
 
-from gantrytau import between, exp, if_else, tanh
+from gantrytau import between, exp, fmax, fmin, if_else, tanh
 
 
 def linear_sign(slope: Any) -> Any:
@@ -37,3 +37,14 @@ def dahl_rate(speed: Any, z: Any, stiffness: Any, coulomb: Any) -> Any:
     """The rate of the deflection z before sliding (Dahl 1968): speed - stiffness |speed| z / coulomb."""
     # no event where the speed changes its sign: the rate only bends there, by as much as a step can bear
     return speed - stiffness * if_else(speed > 0, speed, -speed, smooth=True) * z / coulomb
+
+
+def end_stop(place: Any, speed: Any, ends: tuple[Any, Any], stiffness: Any, a: Any) -> Any:
+    """The force of stops at both ends of a way (Hunt, Crossley 1975), against the motion beyond them; it never pulls.
+
+    stiffness p (1 + 3/2 a v), where p is the depth and v its rate: what hits with v_0 loses about a v_0 of its speed.
+    """
+    low, high = place - ends[0], place - ends[1]
+    push = fmax(stiffness * high * (1 + 1.5 * a * speed), 0)
+    pull = fmin(stiffness * low * (1 - 1.5 * a * speed), 0)
+    return if_else(high > 0, push, if_else(low < 0, pull, 0))

@@ -16,7 +16,13 @@ from gantrytau import (
     stick_slip,
     tanh,
 )
-from gantrytau.mechanics.friction_laws import asymmetric_friction, dahl_rate, linear_sign, stribeck_friction
+from gantrytau.mechanics.friction_laws import (
+    asymmetric_friction,
+    dahl_rate,
+    end_stop,
+    linear_sign,
+    stribeck_friction,
+)
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 BESIDE = "a relative sensor carries no torque; connect it beside a component, not in its place"
@@ -242,6 +248,29 @@ class StickSlipFriction(Friction):
         yield from super().equations()
         smooth = self.tau_v * self.w
         yield stick_slip(self.tau, self.w, coulomb=self.tau_c, smooth=smooth, breakaway=self.tau_s)
+
+
+class EndStop(Model):
+    """Stops at both ends of a way, which push back and never pull; beside a joint as `connect(stop.flange, joint.axis)`."""
+
+    low = Parameter(-1.0, unit="rad", display="deg", description="where the stop at the lower end begins")
+    high = Parameter(1.0, unit="rad", display="deg", description="where the stop at the upper end begins")
+    c = Parameter(1e4, unit="N.m/rad", min=0.0, description="stiffness")
+    a = Parameter(
+        0.5,
+        unit="s/rad",
+        min=0.0,
+        description="dissipation: slope of the lost share of a speed over that speed",
+    )
+    phi = Real(unit="rad", display="deg", description="angle about the axis")
+    tau = Real(unit="N.m", description="torque of the stop, positive against positive speed")
+    flange = Flange()
+
+    def equations(self):
+        yield require(self.low < self.high, "expected the lower end below the upper one")
+        yield self.phi == self.flange.phi
+        yield self.tau == end_stop(self.phi, der(self.phi), (self.low, self.high), self.c, self.a)
+        yield self.flange.tau == self.tau
 
 
 class Torque(Model):

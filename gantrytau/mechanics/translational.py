@@ -16,7 +16,13 @@ from gantrytau import (
     stick_slip,
     tanh,
 )
-from gantrytau.mechanics.friction_laws import asymmetric_friction, dahl_rate, linear_sign, stribeck_friction
+from gantrytau.mechanics.friction_laws import (
+    asymmetric_friction,
+    dahl_rate,
+    end_stop,
+    linear_sign,
+    stribeck_friction,
+)
 
 TWICE_HELD = "something else holds this flange too, as Fixed, Position or Speed; of them only one may stay"
 BESIDE = "a relative sensor carries no force; connect it beside a component, not in its place"
@@ -217,6 +223,29 @@ class StickSlipFriction(Friction):
     def equations(self):
         yield from super().equations()
         yield stick_slip(self.f, self.v, coulomb=self.f_c, smooth=self.f_v * self.v, breakaway=self.f_s)
+
+
+class EndStop(Model):
+    """Stops at both ends of a way, which push back and never pull; beside a slide as `connect(stop.flange, slide.axis)`."""
+
+    low = Parameter(-1.0, unit="m", description="where the stop at the lower end begins")
+    high = Parameter(1.0, unit="m", description="where the stop at the upper end begins")
+    c = Parameter(1e6, unit="N/m", min=0.0, description="stiffness")
+    a = Parameter(
+        0.5,
+        unit="s/m",
+        min=0.0,
+        description="dissipation: slope of the lost share of a speed over that speed",
+    )
+    s = Real(unit="m", description="position along the axis")
+    f = Real(unit="N", description="force of the stop, positive against positive speed")
+    flange = Flange()
+
+    def equations(self):
+        yield require(self.low < self.high, "expected the lower end below the upper one")
+        yield self.s == self.flange.s
+        yield self.f == end_stop(self.s, der(self.s), (self.low, self.high), self.c, self.a)
+        yield self.flange.f == self.f
 
 
 class Force(Model):

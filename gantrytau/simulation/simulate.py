@@ -7,7 +7,7 @@ that only the choice makes. Constraints and their derivatives are kept by projec
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from gantrytau.results.result import Result
 from gantrytau.simulation.events.sticking import with_sticking
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
+from gantrytau.simulation.limits import passed, stopping
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.other_constraints import joined, other_constraints
 from gantrytau.simulation.signals import Signal, read_signals, signal_key
@@ -46,6 +47,7 @@ def simulate(
     starts: Mapping[str, Any] | None = None,
     max_step: float | None = None,
     seed: int | None = None,
+    limits: Literal["warn", "stop"] | None = "warn",
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
@@ -63,13 +65,19 @@ def simulate(
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
     exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
+    limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
+    "stop" ends the run there as `terminate` does, None does not look.
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
-    that are not finite although the states are.
+    that are not finite although the states are, and of limits that are passed.
     """
     _check(start, stop, tolerance, points, max_step)
+    if limits not in ("warn", "stop", None):
+        raise ModelError(
+            f"simulate: found limits={limits!r}, expected 'warn', 'stop' or None", argument="limits"
+        )
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -78,14 +86,15 @@ def simulate(
         dae.expand(name)
     if any(split_derivative(name)[1] for name in wanted):
         dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
+    dae = stopping(dae) if limits == "stop" else dae
     dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)
     _check_inputs(dae, signals)
     grid = np.linspace(start, stop, points)
     result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs)
-    doubt = doubts(result)
-    if doubt:
-        warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
+    for doubt in (doubts(result), passed(dae, result) if limits == "warn" else ""):
+        if doubt:
+            warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
     return result
 
 

@@ -34,23 +34,24 @@ def read_cells(path: Path) -> tuple[list[tuple[int, list[str]]], str]:
 
 
 def headings(
-    path: Path, header: Sequence[str], units: Callable[[str], Sequence[str]]
+    path: Path, header: Sequence[str], units: Callable[[str], Sequence[str]] | None
 ) -> tuple[list[str], list[Scale | None]]:
     """Names of columns, and their units where these stand behind in brackets, "x [mm]".
 
-    units: name -> what a column may measure, in SI units; none for one that is not read. ModelError for other units.
+    units: name -> what a column may measure, in SI units; none for one that is not read; None for any. ModelError for
+    other units.
     """
     names, scales = [], list[Scale | None]()
     for heading in header:
         name, bracket, _ = heading.strip().rpartition(" [")
-        allowed = units(name.strip()) if bracket else ()
-        if not allowed:
+        allowed = units(name.strip()) if bracket and units else ()
+        if not allowed and not (bracket and units is None):
             names.append(heading.strip())
             scales.append(None)
             continue
         try:
             name, unit = column_of(heading)
-            if unit is not None and not any(unit.measures(one) for one in allowed):
+            if unit is not None and allowed and not any(unit.measures(one) for one in allowed):
                 known_scale(f"column {name}", unit.text, allowed[0])
         except ModelError as error:
             raise ModelError(f"{path}: {error}") from None

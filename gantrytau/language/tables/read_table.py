@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau.language.scales import Scale
+from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
 
 
 def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[Any, np.ndarray]:
@@ -16,7 +17,8 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
     Two columns with names in the first line are a curve: xs (n,), ys (n,); columns: which two, where there are more.
     A first line of numbers behind its first cell is a map, `table((x, y), *read_table("map.csv"))`: (xs, ys), values
     (n, m), with ys in the first line, xs in the first column. Cells are separated by commas, or by semicolons or tabs:
-    then decimals may have a comma. ModelError with file and line for what cannot be read.
+    then decimals may have a comma. Columns with units, "v [mm/s]", come in SI and are named without them. ModelError with
+    file and line for what cannot be read, and for a unit that is none.
     """
     path = Path(path)
     rows, separator = read_cells(path)
@@ -38,6 +40,7 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
         raise ModelError(
             f"{path}: found numbers in the first line, expected the names of the columns; add them"
         )
+    header, scales = headings(path, header, None)
     names = list(columns or header)
     if len(names) != 2:
         raise ModelError(
@@ -53,10 +56,14 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
             )
     places = [header.index(name) for name in names]
     x, y = (
-        [_filled(path, line, name, row[k], separator) for line, row in rows[1:]]
+        _in_si([_filled(path, line, name, row[k], separator) for line, row in rows[1:]], scales[k])
         for name, k in zip(names, places, strict=True)
     )
-    return np.array(x), np.array(y)
+    return x, y
+
+
+def _in_si(column: Sequence[float], unit: Scale | None) -> np.ndarray:
+    return np.array(column) if unit is None else np.asarray(unit.si(np.array(column)))
 
 
 def _filled(path: Path, line: int, column: str, cell: str, separator: str) -> float:

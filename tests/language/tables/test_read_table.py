@@ -28,6 +28,16 @@ def test_two_columns_are_chosen_by_name(tmp_path):
     assert table(1.5, *read_table(path, columns=("speed", "torque"))) == 4.5
 
 
+def test_units_in_the_header_become_si(tmp_path):
+    (tmp_path / "law.csv").write_text("v [mm/s],f [kN]\n100,0.5\n200,1\n")
+    x, y = read_table(tmp_path / "law.csv", columns=("v", "f"))
+    assert np.array_equal(x, [0.1, 0.2])
+    assert np.array_equal(y, [500.0, 1000.0])
+    (tmp_path / "odd.csv").write_text("v [mm/s],f [kM]\n100,0.5\n200,1\n")
+    with pytest.raises(ModelError, match=r"column 'f \[kM\]'.*no unit 'kM'"):
+        read_table(tmp_path / "odd.csv")
+
+
 def test_a_map_is_read_whole(tmp_path):
     (xs, ys), values = read_table(written(tmp_path, ";0;10,5;20\n1;1;2;3\n2;4;5;6\n"))
     assert xs.tolist() == [1, 2]

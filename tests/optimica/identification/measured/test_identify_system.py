@@ -78,8 +78,8 @@ def test_an_order_beyond_the_data_is_told():
 def test_beside_nfoursid():
     """The same poles as another implementation by other weights, and as good a model."""
     import pandas
-    from nfoursid import nfoursid
 
+    nfoursid = pytest.importorskip("nfoursid.nfoursid")
     count, half = 1500, 750
     y = noisy(0.05)
     own = identify_system(INPUTS[:half], y[:half], order=8, period=PERIOD, block_rows=12)
