@@ -20,10 +20,10 @@ from gantrytau.errors import DoubtfulResult, ModelError, SolveError
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
+from gantrytau.simulation.events.passed_limits import passed, stopping
 from gantrytau.simulation.events.sticking import with_sticking
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
-from gantrytau.simulation.limits import passed, stopping
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.other_constraints import joined, other_constraints
 from gantrytau.simulation.signals import Signal, read_signals, signal_key
@@ -74,10 +74,7 @@ def simulate(
     that are not finite although the states are, and of limits that are passed.
     """
     _check(start, stop, tolerance, points, max_step)
-    if limits not in ("warn", "stop", None):
-        raise ModelError(
-            f"simulate: found limits={limits!r}, expected 'warn', 'stop' or None", argument="limits"
-        )
+    _check_word(limits)
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -182,6 +179,13 @@ def _check(start: float, stop: float, tolerance: float, points: int, max_step: f
     if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
         raise ModelError(
             f"simulate: found points={points!r}, expected a whole number of at least 2", argument="points"
+        )
+
+
+def _check_word(limits: object) -> None:
+    if limits not in ("warn", "stop", None):
+        raise ModelError(
+            f"simulate: found limits={limits!r}, expected 'warn', 'stop' or None", argument="limits"
         )
 
 

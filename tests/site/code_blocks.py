@@ -143,9 +143,16 @@ def near(shown: str, printed: str) -> bool:
     if not re.search(r"[.eE]", shown):
         return False
     digits, _, power = shown.lower().partition("e")
+    if decimals(shown) > decimals(printed) + 2:  # as of one that is printed rounded
+        return False
     place = 10.0 ** (int(power or 0) - len(digits.partition(".")[2]))
     a, b = float(shown), float(printed)
     return abs(a - b) <= max(1.001 * place, 1e-3 * abs(a)) or max(abs(a), abs(b)) < NOTHING
+
+
+def decimals(number: str) -> int:
+    """How many places stand behind the point."""
+    return len(number.lower().partition("e")[0].partition(".")[2])
 
 
 def run_page(page: Page, title: str) -> None:
