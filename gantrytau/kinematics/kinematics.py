@@ -96,6 +96,10 @@ class Kinematics(Record):
         q, self.iterations_by_pose = self._solver.ik(at.r, at.R)
         return answered(at.one, q)[0]
 
+    def within_a_turn(self, q: np.ndarray, limits: np.ndarray) -> np.ndarray:
+        """Coordinates (N, n) with angles, which a whole turn leaves as they are, nearest to the middle of limits (n, 2)."""
+        return self._solver.within_a_turn(q, limits) if isinstance(self._solver, ModelFunctions) else q
+
     def fk(self, q: Any, near: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """Poses r (N, 3), R (N, 3, 3) of actuator coordinates; (3,) and (3, 3) for one.
 

@@ -107,20 +107,17 @@ class ModelFunctions:
         return found
 
     @cached_property
-    def _turns(self) -> dict[int, float]:
-        """The middle of the turn in which an angle is told, by column: of its limits, else home.
-
-        The angle of a screw, whose turn does not bring the tool back, is not among them.
-        """
-        found = {}
-        for k, (low, high) in enumerate(limits_of(self.dae, self.joints)):
-            variable = self.dae.flat.find(self.joints[k])
+    def _turns(self) -> list[int]:
+        """Columns of angles that a whole turn leaves as they are; the angle of a screw is none."""
+        found = []
+        for k, name in enumerate(self.joints):
+            variable = self.dae.flat.find(name)
             if variable is None or variable.unit != "rad":
                 continue
             q = np.vstack([self.home.q, self.home.q + 2 * np.pi * np.eye(len(self.home.q))[k]])
             here, there = np.hstack(self._forward(*q.T))
             if not np.isfinite(there).all() or np.abs(there - here).max() <= 1e-9 * np.abs(here).max():
-                found[k] = (low + high) / 2 if np.isfinite(high - low) else self.home.q[k]
+                found.append(k)
         return found
 
     @property
@@ -190,11 +187,13 @@ class ModelFunctions:
         return self._posed(self._following.around(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
-        return self._within_a_turn(_whole(np.hstack(self._inverse.around(*self._arguments(x)))))
+        found = _whole(np.hstack(self._inverse.around(*self._arguments(x))))
+        return self.within_a_turn(found, limits_of(self.dae, self.joints))
 
-    def _within_a_turn(self, q: np.ndarray) -> np.ndarray:
-        """Angles at most half a turn from home, or within their limits: ways around an axis end a turn apart."""
-        for k, middle in self._turns.items():
+    def within_a_turn(self, q: np.ndarray, limits: np.ndarray) -> np.ndarray:
+        """Angles at most half a turn from the middle of their limits (n, 2), from home where these are infinite."""
+        for k in self._turns:
+            middle = limits[k].mean() if np.isfinite(limits[k]).all() else self.home.q[k]
             q[:, k] -= 2 * np.pi * np.round((q[:, k] - middle) / (2 * np.pi))
         return q
 

@@ -59,7 +59,7 @@ class ModelExaminer:
         )
 
     def _of_block(self, r: np.ndarray, R: np.ndarray | None) -> dict[str, np.ndarray]:
-        q = self.kinematics.ik(r, R)
+        q = self.kinematics.within_a_turn(self.kinematics.ik(r, R), self.strokes)
         reached = np.isfinite(q).all(axis=1)
         stroke, turn = self._strokes_left(q)
         angle = np.where(reached, np.inf, np.nan)
