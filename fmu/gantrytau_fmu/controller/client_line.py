@@ -41,9 +41,7 @@ class ClientLine:
         whole = isinstance(found, Sample) and isinstance(found.k, (int, np.integer))
         if found is None or (whole and found.k == self.taken_k):
             self.held += 1
-        elif (
-            words := self._refusal(found, k) if whole else f"found {type(found).__name__}, expected a Sample"
-        ):
+        elif words := self._refusal(found, k) if whole else _no_sample(found):
             self.refused, self.reason = self.refused + 1, words
         elif found.k < self.taken_k or found.k < k - 1 - OLDEST:
             self.stale += 1
@@ -85,3 +83,9 @@ class ClientLine:
         except USERS_ERRORS as error:  # of a client, which must not stop the robot
             self.failure = f"raised {type(error).__name__}: {in_words(error)}"
             return None
+
+
+def _no_sample(found: object) -> str:
+    if isinstance(found, Sample):
+        return f"found a Sample whose k is {found.k!r}, expected a whole number"
+    return f"found {type(found).__name__}, expected a Sample"

@@ -7,11 +7,14 @@ from gantrytau import (
     Parameter,
     Real,
     atan2,
+    between,
     cross,
     der,
     dot,
+    fmax,
     if_else,
     limit,
+    logic_and,
     norm_2,
     sampled,
     sqrt,
@@ -67,7 +70,8 @@ class PegHand(Model):
     """An operator who puts a peg into a hole at the origin, by eye: moves above it, pushes gently, and draws it out again.
 
     What he sees is late by `delay`, and the place of the hole is misjudged by a slow random error. He wants velocities
-    that lead to where the peg shall be, and pushes the handle after the speed that he feels. Decided every `period`.
+    that lead to where the peg shall be, and pushes the handle after the speed that he feels. A peg that stands on the rim
+    for too long he lifts, and aims again. Decided every `period`.
     """
 
     period = Parameter(0.004, unit="s", description="period of decisions")
@@ -82,6 +86,11 @@ class PegHand(Model):
     fast = Parameter(0.02, unit="m/s", min=0.0, description="largest wanted speed out of it")
     above = Parameter(3e-3, unit="m", description="height at which he aims")
     below = Parameter(-0.0295, unit="m", description="height to which he pushes")
+    rim = Parameter(1e-3, unit="m", min=0.0, description="height and depth within which it stands on the rim")
+    patience = Parameter(
+        5.0, unit="s", min=0.0, description="for which it may stand there until he lifts it and aims again"
+    )
+    aiming = Parameter(2.0, unit="s", min=0.0, description="for which he lifts it")
     away = Parameter(0.03, unit="m", description="height to which he withdraws")
     begin = Parameter(20.0, unit="s", description="when he begins to push")
     leave = Parameter(79.0, unit="s", description="when he withdraws")
@@ -90,11 +99,19 @@ class PegHand(Model):
     v = Input(3, unit="m/s", description="velocity of the handle")
     seen = Real(3, unit="m", start=[0.0, 0.0, 0.01], fixed=True, description="place of the tip as it is seen")
     error = Real(2, unit="m", start=0.0, fixed=True, description="how far the hole is misjudged")
+    stood = Real(unit="s", start=0.0, description="time for which the peg has stood on the rim")
+    lifted = Real(unit="s", start=0.0, description="time for which he goes on to lift it")
     wanted = Real(3, unit="m/s", start=0.0, description="wanted velocity")
     f = Output(3, unit="N", start=0.0, fixed=True, description="force of the hand on the handle")
 
     def equations(self):
         goal = if_else(time < self.begin, self.above, if_else(time < self.leave, self.below, self.away))
+        pushes = between(self.begin, time, self.leave)
+        stands = logic_and(pushes, between(-self.rim, self.seen[2], self.rim))
+        goal = if_else(logic_and(pushes, self.lifted > 0), self.above, goal)
+        yield sampled(self.stood, if_else(stands, self.stood + self.period, 0), period=self.period)
+        lifts = if_else(self.stood > self.patience, self.aiming, fmax(self.lifted - self.period, 0))
+        yield sampled(self.lifted, lifts, period=self.period)
         sideways = self.gain * (self.error - self.seen[:2])
         upwards = limit(self.gain * (goal - self.seen[2]), -self.speed, self.fast)
         yield self.delay * der(self.seen) == self.r - self.seen

@@ -11,7 +11,8 @@ from gantrytau_fmu.controller.clients import Sample
 from gantrytau_fmu.controller.exchange.messages import NUMBERS, SEQUENCES, Message, MessageKind
 
 KEPT = 4  # answers: those that may be asked for
-SILENCE = 1.0  # s without an answer, after which a virtual clock does not wait any more until there is one
+SILENCE = 1.0  # s without an answer, after which a virtual clock gives a sample up
+MISSED = 2  # samples given up one after the other, after which it waits for nothing until there is an answer
 
 
 class Peer(Protocol):
@@ -42,7 +43,7 @@ class RemoteClient:
         self._newest, self._given = -1, -1
         self._answered = -1  # the newest sample that it has done with, also by an answer that was refused
         self._heard = self._asked = 0.0  # s on the monotonic clock
-        self._lost = False  # silent since it was asked
+        self._missed = 0  # samples given up since it was heard
 
     @property
     def peer(self) -> Peer | None:
@@ -60,7 +61,7 @@ class RemoteClient:
             if self._peer is peer:
                 return
             self._peer, self._newest, self._answered = peer, -1, -1
-            self._heard, self._lost = time.monotonic(), False
+            self._heard, self._missed = time.monotonic(), 0
             self._answers.clear()
 
     def left(self, peer: Peer) -> None:
@@ -72,7 +73,7 @@ class RemoteClient:
     def heard(self, message: Message) -> None:
         """A message of its peer; what is no newer answer to a sample that it was given is dropped."""
         with self._lock:
-            self._heard, self._lost = time.monotonic(), False
+            self._heard, self._missed = time.monotonic(), 0
             k = self._sample(message.sequence)
             answers, self._answered = k > self._newest, max(k, self._answered)
             if refusal := self.sends.refusal(message.values):
@@ -108,12 +109,14 @@ class RemoteClient:
             return next((found for found in reversed(self._answers) if found.k <= k - 1), None)
 
     def settled(self, k: int) -> bool:
-        """Whether it has answered sample k, has nothing to answer, has gone, or is silent since it was asked."""
-        if self._peer is None or not self.sends.size or self._answered >= k or self._lost:
+        """Whether it has answered sample k, has nothing to answer, has gone, or left it without an answer for too long."""
+        if self._peer is None or not self.sends.size or self._answered >= k or self._missed >= MISSED:
             return True
         with self._lock:
-            self._lost = time.monotonic() - max(self._heard, self._asked) > SILENCE
-        return self._lost
+            late = time.monotonic() - max(self._heard, self._asked) > SILENCE
+            if late:
+                self._missed, self._answered = self._missed + 1, max(k, self._answered)
+        return late
 
     def close(self) -> None:
         """Say that the run has ended."""

@@ -60,8 +60,7 @@ class FileStream(_Answering):
         self.path, self.at_end, self.row = path, at_end, -1
         self.columns, units = _header(path)
         super().__init__(name, Declaration([Channel(c, u) for c, u in zip(self.columns, units, strict=True)]))
-        self._rows = np.zeros((0, len(self.columns)))
-        self._times = np.zeros(0)
+        self._times, self._rows = _table(path, self.columns)
 
     @property
     def state(self) -> str:

@@ -116,6 +116,9 @@ def test_a_sample_that_is_lost_on_its_way_shifts_no_row(tmp_path):
         ("time [s]\n0.0\n", "found no column beside the time"),
         ("time [s],dq [mm]\n0.0,1\n", "not a coherent SI unit"),
         ("dq,dq\n1,2\n", "found 'dq' twice"),
+        ("time [s],dq [m]\n0.0,0.1\n0.004\n", "line 3 has 1 cells"),
+        ("time [s],dq [m]\n0.0,x\n", "line 2, column dq"),
+        ("time [s],dq [m]\n0.0,nan\n", "line 2: found an empty cell"),
     ],
 )
 def test_files_that_are_no_corrections_are_refused_at_once(tmp_path, text, words):
@@ -123,22 +126,6 @@ def test_files_that_are_no_corrections_are_refused_at_once(tmp_path, text, words
     file.write_text(text)
     with pytest.raises(ModelError, match=words):
         stream_file(file)
-
-
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        ("0.0,0.1\n0.004\n", "line 3 has 1 cells"),
-        ("0.0,x\n", "line 2, column dq"),
-        ("0.0,nan\n", "line 2: found an empty cell"),
-    ],
-)
-def test_rows_that_are_none_end_the_stream_alone(tmp_path, rows, words):
-    file = tmp_path / "u.csv"
-    file.write_text(f"time [s],dq [m]\n{rows}")
-    found = run(stream_file(file), "stream.dq")
-    assert words in found.timing.clients["stream"].failure
-    assert not found["stream.dq"].any()
 
 
 def test_a_file_that_is_gone_and_other_wishes_are_told(tmp_path):
