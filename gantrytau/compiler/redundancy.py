@@ -85,6 +85,7 @@ def without_redundant(
     try:
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
+        _refuse_drives(flat, table, constraints, guess)
         raise open_loops(flat, error, _nearest(constraints, guess)) from None
     if course:
         matrices = [_over_course(constraints, course)[-1]]
@@ -290,6 +291,21 @@ def _refuse_conflicts(
     against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
     if against:
         raise overdriven(flat, inputs, against)
+
+
+def _refuse_drives(
+    flat: FlatModel, table: ParameterTable, constraints: Constraints, guess: StartValues
+) -> None:
+    """StructureError where loops stay open because more is driven than can move, seen where they close without drives."""
+    if not constraints.known:
+        return
+    free, loose = _read(flat, table, frozenset(), constraints.equations)
+    try:
+        closed = {**guess.values, **_close(free, loose, loose.values, flat.name)}
+    except InitializationError:
+        return
+    kept = _independent([_matrix(_slopes(constraints, closed))], constraints.firm)
+    _refuse_conflicts(flat, constraints, closed, kept)
 
 
 def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:
