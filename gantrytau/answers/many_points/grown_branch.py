@@ -5,6 +5,8 @@ one about the first axis of an arm. So the branch is grown once: places in a box
 the nearest known one, the box is widened until nothing more is reached. Others are led from the nearest of those.
 """
 
+from typing import Any
+
 import numpy as np
 
 from gantrytau.answers.many_points.through_blocks import ThroughBlocks
@@ -27,16 +29,13 @@ class GrownBranch:
 
     def __call__(self, q: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
         """Unknowns (n, N) at arguments q (k, N), led from their nearest known points; NaN where none of them leads."""
-        from scipy.spatial import cKDTree
-
         found = np.full((len(self.known) - self._count, q.shape[1]), np.nan)
-        left, size = np.arange(q.shape[1]), 0
+        left, (tree, size) = np.arange(q.shape[1]), self._nearest()
         for neighbour in range(neighbours):
             if not left.size:
                 break
             if self.known.shape[1] > size:
-                size = self.known.shape[1]
-                tree = cKDTree((self.known[: self._count] / self._spread[:, None]).T)
+                tree, size = self._nearest()
             near = tree.query((q[:, left] / self._spread[:, None]).T, k=[min(neighbour, size - 1) + 1])[1][
                 :, 0
             ]
@@ -47,6 +46,12 @@ class GrownBranch:
                 self.known = np.hstack([self.known, np.vstack([q[:, left[good]], y[:, good]])])
             left = left[~good]
         return found
+
+    def _nearest(self) -> tuple[Any, int]:
+        """A tree of the known arguments, by which the nearest are found, and how many these are."""
+        from scipy.spatial import KDTree
+
+        return KDTree((self.known[: self._count] / self._spread[:, None]).T), self.known.shape[1]
 
     @property
     def _spread(self) -> np.ndarray:
