@@ -6,6 +6,7 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
+from gantrytau.compiler.blocks.cancellation import combined
 from gantrytau.compiler.blocks.determinacy import massless, refuse_undetermined
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
@@ -101,6 +102,44 @@ def _translated(
     """From the flat model without redundant constraints to the sorted system."""
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     wanted = _wanted_derivatives(flat, request.find)
+    try:
+        return _sorted(settled, flat, reduced, known, request, start)
+    except (InitializationError, StructureError) as error:
+        found = combined(reduced, flat, wanted, error)
+        if found.decisive & _loose(flat, request):
+            raise
+        try:
+            if found.decisive:
+                return translate_flat(_folded(flat, found.decisive), request, start)
+            return _sorted(settled, flat, found.reduced, known, request, start)
+        except StructureError:
+            if isinstance(error, StructureError):
+                raise error from None
+            raise
+
+
+def _loose(flat: FlatModel, request: Request) -> set[str]:
+    """Parameters that have to stay symbols."""
+    given = {n for name in request.given for n in flat.expand(name)}
+    return given | {n for p in flat.parameters if p.free for n in p.elements}
+
+
+def _folded(flat: FlatModel, names: frozenset[str]) -> FlatModel:
+    """The model with the values of some more parameters folded in."""
+    parameters = (replace(p, fold=p.fold or not names.isdisjoint(p.elements)) for p in flat.parameters)
+    return replace(flat, parameters=tuple(parameters))
+
+
+def _sorted(
+    settled: Settled,
+    flat: FlatModel,
+    reduced: Reduced,
+    known: tuple[str, ...],
+    request: Request,
+    start: Mapping[str, float],
+) -> Translated:
+    """The reduced equations differentiated, started and solved block by block."""
+    wanted = _wanted_derivatives(flat, request.find)
     indexed = reduce_index(reduced, flat, wanted)
     _refuse_differentiated(flat, reduced, indexed, wanted)
     asked = start_values(flat, reduced, indexed.symbols(reduced.known))
@@ -115,7 +154,7 @@ def _translated(
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.incidence, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
-    guide = Guide(sample, table.values, choice.states)
+    guide = Guide(sample, reduced.table.values, choice.states)
     blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
     refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
     found = Translated(
