@@ -110,12 +110,28 @@ def _translated(
             raise
         try:
             if found.decisive:
-                return translate_flat(_folded(flat, found.decisive), request, start)
+                return _shaped(settled, flat, found.decisive, known, request, start)
             return _sorted(settled, flat, found.reduced, known, request, start)
         except StructureError:
             if isinstance(error, StructureError):
                 raise error from None
             raise
+
+
+def _shaped(
+    settled: Settled,
+    flat: FlatModel,
+    names: frozenset[str],
+    known: tuple[str, ...],
+    request: Request,
+    start: Mapping[str, float],
+) -> Translated:
+    """The same with the values of some more parameters folded in, as they decide on the structure."""
+    flat = _folded(flat, names)
+    table, _ = _given(flat, request.given)
+    return _translated(
+        replace(settled, flat=_folded(settled.flat, names)), flat, table, known, request, start
+    )
 
 
 def _loose(flat: FlatModel, request: Request) -> set[str]:
@@ -160,8 +176,8 @@ def _sorted(
     found = Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )
-    _refuse_reinits(found)
-    return found
+    decisive = _refuse_reinits(found)
+    return _shaped(settled, flat, decisive, known, request, start) if decisive else found
 
 
 def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
@@ -182,16 +198,25 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
     return found
 
 
-def _refuse_reinits(dae: Translated) -> None:
-    """ModelError for a variable that a when gives a new value although it is no state, or is one by another name."""
+def _refuse_reinits(dae: Translated) -> frozenset[str]:
+    """ModelError for a variable that a when gives a new value although it is no state, or is one by another name.
+
+    A variable behind an equation of two unknowns may be a multiple of a state: the parameters that decide on it.
+    """
     owners: dict[str, str] = {}
     for one in dae.flat.whens:
         for name, _ in one.reinits:
             symbol = dae.reduced.aliases[name].symbol
             if symbol not in dae.choice.states:
+                keys = next((b.equations for b in dae.blocks if b.unknowns == (symbol,)), ())
+                leaves = {s.name() for k in keys for s in ca.symvar(dae.indexed.residuals[k])}
+                decisive = leaves.intersection(dae.table.independent)
+                if decisive and len(leaves - decisive) == 2 and not decisive & _loose(dae.flat, dae.request):
+                    return frozenset(decisive)
                 raise no_reinit(one.label, name, dae.states)
             if owners.setdefault(symbol, name) != name:
                 raise twice_reinit(one.label, name, owners[symbol])
+    return frozenset()
 
 
 def retranslate(dae: Translated, flat: FlatModel) -> Translated:

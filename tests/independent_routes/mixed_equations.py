@@ -28,7 +28,7 @@ class Mixed:
         """The unknowns at a time."""
         angle, size = self.rates * t + self.phases, len(self.rates)
         plain = np.sin(angle)
-        chain = [plain[-1], self.rates[-1] * np.cos(angle[-1]), -self.rates[-1] ** 2 * plain[-1]]
+        chain = [plain[-1], self.rates[-1] * np.cos(angle[-1]), -(self.rates[-1] ** 2) * plain[-1]]
         return self.mixing @ np.concatenate([plain[: size - 1], chain])
 
     def model(self) -> Model:
@@ -41,7 +41,10 @@ class Mixed:
             def equations(self):
                 pieces = zip(mixed.rates, mixed.phases, strict=True)
                 known = [sin(float(rate) * time + float(phase)) for rate, phase in pieces]
-                known += [sin(float(r) * time + float(p) + np.pi / 2) for r, p in zip(mixed.rates, mixed.phases, strict=True)]
+                known += [
+                    sin(float(r) * time + float(p) + np.pi / 2)
+                    for r, p in zip(mixed.rates, mixed.phases, strict=True)
+                ]
                 for e, a, b in zip(mixed.derivatives, mixed.values, mixed.forces, strict=True):
                     left = sum(float(x) * der(self.w[j]) for j, x in enumerate(e) if x)
                     left += sum(float(x) * self.w[j] for j, x in enumerate(a) if x)

@@ -52,7 +52,9 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
         except StructureError:
             if isinstance(error, StructureError) or not names:
                 raise error from None
-            raise held_together(flat.name, names, "what their combination leaves determines no unknown") from None
+            raise held_together(
+                flat.name, names, "what their combination leaves determines no unknown"
+            ) from None
         system = _System.of(found, indexed, start_values(flat, found, indexed.symbols(found.known)).values)
         factors = system.constant_factors(vary=True)
         if factors is None:
@@ -64,7 +66,9 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
             changing = system.changing_factors()
             if changing is not None and isinstance(error, InitializationError):
                 names = [indexed.names[i] for i in np.flatnonzero(changing)]
-                raise held_together(flat.name, names, "the factors of the combination change with the motion") from None
+                raise held_together(
+                    flat.name, names, "the factors of the combination change with the motion"
+                ) from None
             if found is reduced:
                 raise error
             return Combined(found)
@@ -199,7 +203,9 @@ def _without_cancelled(parts: ca.SX, factors: np.ndarray, points: Sequence[Mappi
     # what does not depend on a symbol may be read at any value of it, where it is finite
     for value in (0.0, 1.0):
         found = ca.substitute(total, ca.vertcat(*gone), ca.DM([value] * len(gone))) if gone else total
-        if not ca.Function("at", [x], [found], {"allow_free": False})([points[0][s.name()] for s in leaves]).is_regular():
+        if not ca.Function("at", [x], [found], {"allow_free": False})(
+            [points[0][s.name()] for s in leaves]
+        ).is_regular():
             continue
         break
     return found
