@@ -105,7 +105,7 @@ def _jointly(
     if not late:
         raise error  # all that is held are positions, which have been tried
     whole = dae.indexed.whole
-    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free))
+    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free), whole.exact)
     try:
         found = solve_levels([level], guess.values, held=held, started=guess.started | held, title=dae.name)
     except InitializationError:

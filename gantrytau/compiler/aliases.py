@@ -306,6 +306,8 @@ class _Elimination:
                 stack.append((node.dep(1), factor * float(node.dep(0))))
             elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor * float(node.dep(1))))
+            elif node.is_op(ca.OP_DIV) and node.dep(1).is_constant():
+                stack.append((node.dep(0), factor / float(node.dep(1))))
             elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
                 terms.shift(factor, node)
             else:

@@ -220,12 +220,15 @@ def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, lea
     )
 
 
-def held_together(title: str, names: Sequence[str], why: str) -> StructureError:
-    """Equations that hold the same combination of highest derivatives."""
-    shown = " and ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+def held_together(title: str, names: Sequence[str], symbols: Sequence[str], why: str) -> StructureError:
+    """Equations that hold the same combination of unknowns, the highest derivatives of variables."""
+
+    def listed(words: Sequence[str]) -> str:
+        return " and ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")
+
     return StructureError(
-        f"{title}: {shown} hold the same combination of derivatives, and {why}. Expected equations from which each highest "
-        "derivative follows: write one of them without these derivatives, or remove the one that repeats the others"
+        f"{title}: {listed(names)} hold the same combination of {listed(symbols)}, and {why}. Expected equations from which "
+        "each of these follows: write one of them without these unknowns, or replace the one that repeats the others"
     )
 
 

@@ -15,7 +15,7 @@ from gantrytau import Model, Real, der, sin, time
 
 @dataclass(frozen=True)
 class Mixed:
-    """derivatives, values: of E w' + A w = B sin(rates t + phases), (n, n) and (n, k); motion: the solution at a time, (n,)."""
+    """E w' + A w = B [sin(rates t + phases), cos(rates t + phases)], E and A (n, n); w = mixing [x, z]."""
 
     derivatives: np.ndarray
     values: np.ndarray

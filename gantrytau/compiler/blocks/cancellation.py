@@ -12,6 +12,7 @@ Nedialkov and Pryce, ACM Trans. Math. Softw. 43, 2017). Whether J is regular is 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any, cast
 
 import casadi as ca
 import numpy as np
@@ -45,16 +46,15 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
 
     StructureError where the factors are not constant, or a combination determines nothing.
     """
-    found, names = reduced, ()
+    found, names, symbols = reduced, [], []
     while True:
         try:
             indexed = reduce_index(found, flat, wanted)
         except StructureError:
             if isinstance(error, StructureError) or not names:
                 raise error from None
-            raise held_together(
-                flat.name, names, "what their combination leaves determines no unknown"
-            ) from None
+            why = "what their combination leaves determines no unknown"
+            raise held_together(flat.name, names, symbols, why) from None
         system = _System.of(found, indexed, start_values(flat, found, indexed.symbols(found.known)).values)
         factors = system.constant_factors(vary=True)
         if factors is None:
@@ -66,13 +66,12 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
             changing = system.changing_factors()
             if changing is not None and isinstance(error, InitializationError):
                 names = [indexed.names[i] for i in np.flatnonzero(changing)]
-                raise held_together(
-                    flat.name, names, "the factors of the combination change with the motion"
-                ) from None
+                symbols = system.symbols_of(changing)
+                raise held_together(flat.name, names, symbols, "its factors change with the motion") from None
             if found is reduced:
                 raise error
             return Combined(found)
-        names = [indexed.names[i] for i in np.flatnonzero(factors)]
+        names, symbols = [indexed.names[i] for i in np.flatnonzero(factors)], system.symbols_of(factors)
         found = _replaced(found, indexed, factors, system.points(vary=False))
 
 
@@ -104,20 +103,25 @@ class _System:
             )
         return found
 
+    @property
+    def _place(self) -> list[int]:
+        """Where the highest derivatives stand among the leaves."""
+        place = {n: k for k, n in enumerate(self.level.leaves)}
+        return [place[n] for n in self.level.unknowns if n in place]
+
     def _matrices(self, vary: bool) -> list[np.ndarray]:
-        """The Jacobian by the highest derivatives at each point where it is finite."""
-        level = self.level
-        place = {n: k for k, n in enumerate(level.leaves)}
-        columns = [place[n] for n in level.unknowns if n in place]
-        found = []
+        """The Jacobian by the highest derivatives at each point where it is finite, without what is rounding."""
+        level, found = self.level, []
         for point in self.points(vary):
-            _, slopes = level.look(np.array([point[n] for n in level.leaves]))
+            numbers = np.array([point[n] for n in level.leaves])
+            _, slopes = level.look(numbers)
             if np.all(np.isfinite(slopes)):
-                found.append(level.jacobian(slopes)[:, columns])
+                jacobian = np.where(level.certainty(numbers, slopes) < 0, 0.0, level.jacobian(slopes))
+                found.append(jacobian[:, self._place])
         return found
 
     def constant_factors(self, vary: bool) -> np.ndarray | None:
-        """Factors with which the rows vanish at all points, one of the least differentiated being 1; None if there are none."""
+        """Factors with which the rows vanish at all points, one of the least differentiated having 1; or None."""
         matrices = self._matrices(vary)
         return self._factors(np.hstack(matrices)) if matrices else None
 
@@ -129,11 +133,12 @@ class _System:
     def _factors(self, matrix: np.ndarray) -> np.ndarray | None:
         from scipy.linalg import qr, solve_triangular
 
-        rows, columns = balance(matrix)
-        scaled = rows * matrix * columns
-        sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
+        rows, columns = balance(matrix, 1)  # at such a point nothing is small by accident
+        sizes = np.linalg.norm(rows * matrix * columns, axis=1, keepdims=True)
         rows = rows / np.where(sizes > 0, sizes, 1.0)
-        r, order = qr((rows * matrix * columns).T, mode="r", pivoting=True)
+        r, order = cast(
+            tuple[np.ndarray, np.ndarray], qr((rows * matrix * columns).T, mode="r", pivoting=True)
+        )
         rank = int(np.count_nonzero(np.abs(np.diag(r)) > RANK))
         if rank == len(matrix):
             return None
@@ -146,6 +151,11 @@ class _System:
         first = max((i for i in there if self.counts[i] == least), key=lambda i: abs(found[i]))
         found *= rows.ravel()
         return np.array([_fraction(x) for x in found / found[first]])
+
+    def symbols_of(self, factors: np.ndarray) -> list[str]:
+        """The highest derivatives that cancel."""
+        there = np.any(self._matrices(vary=False)[0][np.flatnonzero(factors)] != 0, axis=0)
+        return [self.level.leaves[k] for k, stands in zip(self._place, there, strict=True) if stands]
 
     def parameters_of(self, factors: np.ndarray) -> frozenset[str]:
         """Parameters in the coefficients that cancel."""
@@ -178,7 +188,7 @@ def _replaced(
         label=f"combination of {names}" if len(there) > 1 else names,
     )
 
-    def exchanged(column: Sequence, new: object) -> tuple:
+    def exchanged(column: Sequence[Any], new: Any) -> tuple[Any, ...]:
         return tuple(new if i == place else old for i, old in enumerate(column))
 
     return replace(
@@ -200,12 +210,9 @@ def _without_cancelled(parts: ca.SX, factors: np.ndarray, points: Sequence[Mappi
         slopes = np.array(look([point[leaf.name()] for leaf in leaves]))
         cancelled &= np.abs(factors @ slopes) <= NOISE * (np.abs(factors) @ np.abs(slopes))
     gone = [leaf for leaf, zero in zip(leaves, cancelled, strict=True) if zero]
-    # what does not depend on a symbol may be read at any value of it, where it is finite
-    for value in (0.0, 1.0):
-        found = ca.substitute(total, ca.vertcat(*gone), ca.DM([value] * len(gone))) if gone else total
-        if not ca.Function("at", [x], [found], {"allow_free": False})(
-            [points[0][s.name()] for s in leaves]
-        ).is_regular():
-            continue
-        break
-    return found
+    if not gone:
+        return total
+    # what does not depend on a symbol may be read at any value of it where it is finite
+    zero, one = (ca.substitute(total, ca.vertcat(*gone), ca.DM([value] * len(gone))) for value in (0.0, 1.0))
+    finite = ca.Function("at", [x], [zero])([points[0][leaf.name()] for leaf in leaves]).is_regular()
+    return zero if finite else one

@@ -36,11 +36,12 @@ LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Equations that are solved together: residuals, and symbols that may move."""
+    """Equations that are solved together: residuals, and symbols that may move; exact: those whose numbers are given."""
 
     residuals: tuple[ca.SX, ...]
     names: tuple[str, ...]  # of the residuals, for messages
     unknowns: tuple[str, ...]
+    exact: frozenset[str] = frozenset()
 
     @cached_property
     def leaves(self) -> tuple[str, ...]:
@@ -65,6 +66,25 @@ class Level:
         """Rows and columns of the derivatives that are not structurally zero."""
         rows, columns = self._symbolic[2].sparsity().get_triplet()
         return np.array(rows, dtype=int), np.array(columns, dtype=int)
+
+    @cached_property
+    def _exact_slopes(self) -> tuple[np.ndarray, ca.Function]:
+        """Places of the derivatives that hold exact numbers alone, and how large their terms are."""
+        x, _, jacobian = self._symbolic
+        slopes = jacobian.nonzeros()
+        names = ({leaf.name() for leaf in ca.symvar(slope)} for slope in slopes)
+        places = np.array([k for k, held in enumerate(names) if held <= self.exact], dtype=int)
+        sizes = term_sizes([slopes[k] for k in places]) if places.size else []
+        return places, ca.Function("sizes", [x], [ca.vertcat(*sizes)])
+
+    def certainty(self, numbers: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Which derivatives by the leaves are sure not to be rounding, 1, or to be it, -1, however small they are."""
+        places, sizes = self._exact_slopes
+        found = np.zeros((len(self.residuals), len(self.leaves)))
+        rows, columns = self.entries
+        sound = np.abs(slopes[places]) > ROUNDING * np.array(sizes(numbers)).ravel()
+        found[rows[places], columns[places]] = np.where(sound, 1, -1)
+        return found
 
     @cached_property
     def _function(self) -> ca.Function:
@@ -189,7 +209,7 @@ def _solve_switching(
     def read(numbers: Mapping[str, float]) -> tuple[float, ...]:
         return tuple(np.array(modes([numbers[n] for n in level.leaves])).ravel().tolist())
 
-    smooth = Level(found.expressions, level.names, level.unknowns)
+    smooth = Level(found.expressions, level.names, level.unknowns, level.exact)
     waiting, seen = [read(values)], set[tuple[float, ...]]()
     while waiting and len(seen) < MOST_PIECES:
         chosen = waiting.pop(0)
@@ -236,31 +256,38 @@ def _solve(
         """Where steps of these sizes lead."""
         return newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)[0]
 
-    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-        """What is left at a point, and which equations do not hold."""
+    def left_at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is left at a point, which equations do not hold, and the Jacobian."""
         f, jacobian = at(point)
         bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
-        if np.any(bad) and usual:
-            # unknowns that are solved together have the rounding of the largest, in their sizes
-            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
-            bad &= ~(np.abs(f) <= ROUNDING * rounding)
         left = np.flatnonzero(bad)
         if left.size and np.all(np.isfinite(f)):
             bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        return f, bad
+        return f, bad, jacobian
 
-    rows, sizes = balance(at(start)[1])
-    usual = not np.any(sizes != 1)  # sizes of metres, radians and newtons
+    def but_for_rounding(found, point: np.ndarray, sizes: np.ndarray | float) -> np.ndarray:
+        """Which equations do not hold if unknowns have the rounding of the largest of them, in their sizes."""
+        f, bad, jacobian = found
+        rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
+        return bad & ~(np.abs(f) <= ROUNDING * rounding)
+
     point = led(1.0, 1.0)
-    f, bad = left_at(point, 1.0)
-    if np.any(bad) and not usual:
-        usual, first = True, point
-        point = led(rows, sizes)
-        f, bad = left_at(point, sizes)
-        f_first, bad_first = left_at(first, sizes)
-        # where both hold but for rounding, the point where less is left
-        if not np.any(bad_first) and np.linalg.norm(rows * f_first) < np.linalg.norm(rows * f):
-            point, f, bad = first, f_first, bad_first
+    found = left_at(point)
+    if np.any(found[1]):
+        around[columns] = start
+        certainty = level.certainty(around, level.look(around)[1])[:, columns]
+        rows, sizes = balance(at(start)[1], certainty)
+        first, held = found, but_for_rounding(found, point, 1.0)
+        if np.any(rows != 1) or np.any(sizes != 1):  # others than metres, radians and newtons
+            other = led(rows, sizes)
+            found = left_at(other)
+            bad = but_for_rounding(found, other, sizes) if np.any(found[1]) else found[1]
+            # where both hold but for rounding, the point where less is left
+            worse = np.linalg.norm(rows.ravel() * first[0]) >= np.linalg.norm(rows.ravel() * found[0])
+            if np.any(held) or not np.any(found[1]) or (worse and not np.any(bad)):
+                point, first, held = other, found, bad
+        found = (first[0], held, first[2])
+    f, bad, _ = found
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
