@@ -30,6 +30,7 @@ POINTS = 3
 SPREAD = 0.4  # of values around the start
 RANK = 1e-9  # of a row of length one, beyond the span of others, below which it depends on them
 NOISE = 1e-10  # of the terms of a derivative, below which they cancel
+MOST_ORDERS = 10  # of derivatives, of which each combination takes one away
 DENOMINATOR = 1000  # of factors that are meant as fractions
 
 
@@ -47,7 +48,7 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
     StructureError where the factors are not constant, or a combination determines nothing.
     """
     found, names, symbols = reduced, [], []
-    while True:
+    for _ in range(MOST_ORDERS * len(reduced.unknowns)):
         try:
             indexed = reduce_index(found, flat, wanted)
         except StructureError:
@@ -73,6 +74,7 @@ def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Ex
             return Combined(found)
         names, symbols = [indexed.names[i] for i in np.flatnonzero(factors)], system.symbols_of(factors)
         found = _replaced(found, indexed, factors, system.points(vary=False))
+    raise error
 
 
 @dataclass(frozen=True, eq=False)

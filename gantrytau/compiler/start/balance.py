@@ -11,7 +11,7 @@ ROUNDS = 30
 
 
 def balance(matrix: np.ndarray, certainty: np.ndarray | int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Factors of rows and of columns, (m, 1) and (n,); certainty: -1 of entries that are rounding, 1 of others however small."""
+    """Factors of rows and of columns, (m, 1) and (n,); certainty: -1 of rounding, 1 of what is none."""
     size = np.abs(np.nan_to_num(matrix))
     there = (size > NOISE * size.max(axis=0, initial=0.0)) & (
         size > NOISE * size.max(axis=1, keepdims=True, initial=0.0)
