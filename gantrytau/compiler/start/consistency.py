@@ -353,7 +353,7 @@ def newton(
 def _longest(point: np.ndarray, step: np.ndarray) -> float:
     """The share of a step that may be taken at once."""
     reach = np.maximum(LONGEST_STEP, np.abs(point))
-    return float(np.min(reach / np.maximum(np.abs(step), 1e-300), initial=1.0))
+    return float(1.0 / np.max(np.abs(step) / reach, initial=1.0))
 
 
 def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray:
