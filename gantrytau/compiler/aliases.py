@@ -377,11 +377,8 @@ class _Elimination:
             if name in self.parents:
                 alias = self.root(name, order)
                 old.append(leaf)
-                new.append(self.expression(alias))
+                new.append(alias_expression(alias, self.chains))
         return ca.substitute(vector, ca.vertcat(*old), ca.vertcat(*new)).elements() if old else residuals
-
-    def expression(self, alias: Alias) -> ca.SX:
-        return alias_expression(alias, self.chains)
 
 
 def _plus(total: ca.SX, factor: float, offset: ca.SX) -> ca.SX:

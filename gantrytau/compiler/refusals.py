@@ -220,15 +220,12 @@ def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, lea
     )
 
 
-def held_together(title: str, names: Sequence[str], symbols: Sequence[str], why: str) -> StructureError:
+def held_together(title: str, names: Sequence[str], why: str) -> StructureError:
     """Equations that hold the same combination of unknowns, the highest derivatives of variables."""
-
-    def listed(words: Sequence[str]) -> str:
-        return " and ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")
-
+    shown = " and ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
     return StructureError(
-        f"{title}: {listed(names)} hold the same combination of {listed(symbols)}, and {why}. Expected equations from which "
-        "each of these follows: write one of them without these unknowns, or replace the one that repeats the others"
+        f"{title}: {shown} hold their highest derivatives in the same combination, and {why}. Expected equations from which "
+        "each of these follows: write one of them without these, or replace the one that repeats the others"
     )
 
 

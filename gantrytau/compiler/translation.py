@@ -105,13 +105,13 @@ def _translated(
     try:
         return _sorted(settled, flat, reduced, known, request, start)
     except (InitializationError, StructureError) as error:
-        found = combined(reduced, flat, wanted, error)
-        if found.decisive & _loose(flat, request):
+        reduced, decisive = combined(reduced, flat, wanted, error)
+        if decisive & _loose(flat, request):
             raise
         try:
-            if found.decisive:
-                return _shaped(settled, flat, found.decisive, known, request, start)
-            return _sorted(settled, flat, found.reduced, known, request, start)
+            if decisive:
+                return _shaped(settled, flat, decisive, known, request, start)
+            return _sorted(settled, flat, reduced, known, request, start)
         except StructureError:
             if isinstance(error, StructureError):
                 raise error from None
@@ -127,23 +127,19 @@ def _shaped(
     start: Mapping[str, float],
 ) -> Translated:
     """The same with the values of some more parameters folded in, as they decide on the structure."""
-    flat = _folded(flat, names)
-    table, _ = _given(flat, request.given)
-    return _translated(
-        replace(settled, flat=_folded(settled.flat, names)), flat, table, known, request, start
-    )
+
+    def folded(one: FlatModel) -> FlatModel:
+        parameters = (replace(p, fold=p.fold or not names.isdisjoint(p.elements)) for p in one.parameters)
+        return replace(one, parameters=tuple(parameters))
+
+    flat, settled = folded(flat), replace(settled, flat=folded(settled.flat))
+    return _translated(settled, flat, _given(flat, request.given)[0], known, request, start)
 
 
 def _loose(flat: FlatModel, request: Request) -> set[str]:
     """Parameters that have to stay symbols."""
     given = {n for name in request.given for n in flat.expand(name)}
     return given | {n for p in flat.parameters if p.free for n in p.elements}
-
-
-def _folded(flat: FlatModel, names: frozenset[str]) -> FlatModel:
-    """The model with the values of some more parameters folded in."""
-    parameters = (replace(p, fold=p.fold or not names.isdisjoint(p.elements)) for p in flat.parameters)
-    return replace(flat, parameters=tuple(parameters))
 
 
 def _sorted(

@@ -236,7 +236,6 @@ class FlatModel(Record):
                     raise ModelError(
                         f"{place}: found {owners[scalar]} and {name}, which both give {scalar}, expected one value for it; "
                         "leave one of them out",
-                        argument=place if place in ("inputs", "parameters", "starts") else None,
                     )
 
     def unit(self, name: str) -> str | None:

@@ -119,7 +119,7 @@ class Changing(Shared):
 )
 def test_equations_that_cannot_be_combined_are_named(model, why):
     with pytest.raises(
-        StructureError, match=r"equation 1 and .*equation 2.* hold the same combination of der"
+        StructureError, match=r"equation 1 and .*equation 2.* hold their highest derivatives in the same comb"
     ) as told:
         translate(model())
     assert why in str(told.value)

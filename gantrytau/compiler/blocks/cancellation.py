@@ -9,8 +9,8 @@ which holds lower derivatives only and has the same solutions together with the 
 Nedialkov and Pryce, ACM Trans. Math. Softw. 43, 2017). Whether J is regular is seen at points chosen at random.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, cast
 
@@ -21,7 +21,6 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.refusals import held_together
 from gantrytau.compiler.start.balance import balance
-from gantrytau.compiler.start.consistency import Level
 from gantrytau.compiler.start.start_values import start_values
 from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
@@ -34,137 +33,90 @@ MOST_ORDERS = 10  # of derivatives, of which each combination takes one away
 DENOMINATOR = 1000  # of factors that are meant as fractions
 
 
-@dataclass(frozen=True, eq=False)
-class Combined:
-    """Equations in which derivatives cancel no more, or the parameters that decide on it by their values."""
+def combined(
+    reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Exception
+) -> tuple[Reduced, frozenset[str]]:
+    """The equations with combinations in place of those whose derivatives cancel; or the parameters that make them cancel.
 
-    reduced: Reduced
-    decisive: frozenset[str] = frozenset()
-
-
-def combined(reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Exception) -> Combined:
-    """The equations with combinations in place of those whose derivatives cancel; raises `error` where none do.
-
-    StructureError where the factors are not constant, or a combination determines nothing.
+    Raises `error` where none do, StructureError where factors are not constant or a combination determines nothing.
     """
-    found, names, symbols = reduced, [], []
+    found, names, parameters = reduced, [], set(reduced.table.independent)
     for _ in range(MOST_ORDERS * len(reduced.unknowns)):
         try:
             indexed = reduce_index(found, flat, wanted)
         except StructureError:
             if isinstance(error, StructureError) or not names:
                 raise error from None
-            why = "what their combination leaves determines no unknown"
-            raise held_together(flat.name, names, symbols, why) from None
-        system = _System.of(found, indexed, start_values(flat, found, indexed.symbols(found.known)).values)
-        factors = system.constant_factors(vary=True)
+            raise held_together(flat.name, names, "what it leaves determines no unknown") from None
+        values = start_values(flat, found, indexed.symbols(found.known)).values
+        points = _points(values, parameters)
+        factors = _factors(indexed, _points(values, set()))
         if factors is None:
-            factors = system.constant_factors(vary=False)
-            decisive = frozenset() if factors is None else system.parameters_of(factors)
+            factors = _factors(indexed, points)
+            decisive = frozenset() if factors is None else _coefficients(indexed, factors) & parameters
             if decisive:
-                return Combined(found, decisive)
+                return found, decisive
         if factors is None:
-            changing = system.changing_factors()
+            changing = _factors(indexed, points[:1])
             if changing is not None and isinstance(error, InitializationError):
                 names = [indexed.names[i] for i in np.flatnonzero(changing)]
-                symbols = system.symbols_of(changing)
-                raise held_together(flat.name, names, symbols, "its factors change with the motion") from None
+                raise held_together(flat.name, names, "its factors change with the motion") from None
             if found is reduced:
                 raise error
-            return Combined(found)
-        names, symbols = [indexed.names[i] for i in np.flatnonzero(factors)], system.symbols_of(factors)
-        found = _replaced(found, indexed, factors, system.points(vary=False))
+            return found, frozenset()
+        names = [indexed.names[i] for i in np.flatnonzero(factors)]
+        found = _replaced(found, indexed, factors, points)
     raise error
 
 
-@dataclass(frozen=True, eq=False)
-class _System:
-    """The equations that determine the highest derivatives; values: numbers of all symbols around which points lie."""
+def _points(values: Mapping[str, float], held: Set[str]) -> list[dict[str, float]]:
+    """Numbers of all symbols at random around some, but for those that are held."""
+    random = np.random.default_rng(0)
+    moves = ((n, x, random.uniform(-SPREAD, SPREAD)) for _ in range(POINTS) for n, x in values.items())
+    moved = [(n, x if n in held else x * (1 + share) if x else share) for n, x, share in moves]
+    return [dict(moved[k * len(values) : (k + 1) * len(values)]) for k in range(POINTS)]
 
-    level: Level
-    counts: tuple[int, ...]
-    values: Mapping[str, float]
-    parameters: frozenset[str]
 
-    @classmethod
-    def of(cls, reduced: Reduced, indexed: Indexed, values: Mapping[str, float]) -> "_System":
-        """Of indexed equations."""
-        return cls(indexed.levels[-1], indexed.counts, values, frozenset(reduced.table.independent))
+def _factors(indexed: Indexed, points: Sequence[Mapping[str, float]]) -> np.ndarray | None:
+    """Factors with which the rows of the Jacobian by the highest derivatives vanish at all points, or None.
 
-    def points(self, vary: bool) -> list[dict[str, float]]:
-        """Numbers of all symbols at random, those of parameters only if they vary."""
-        random = np.random.default_rng(0)
-        found = []
-        for _ in range(POINTS):
-            share = dict(zip(self.values, random.uniform(-SPREAD, SPREAD, len(self.values)), strict=True))
-            found.append(
-                {
-                    n: x if n in self.parameters and not vary else x * (1 + share[n]) if x else share[n]
-                    for n, x in self.values.items()
-                }
-            )
-        return found
+    One of those that are differentiated least has the factor 1.
+    """
+    from scipy.linalg import qr, solve_triangular
 
-    @property
-    def _place(self) -> list[int]:
-        """Where the highest derivatives stand among the leaves."""
-        place = {n: k for k, n in enumerate(self.level.leaves)}
-        return [place[n] for n in self.level.unknowns if n in place]
+    level, found = indexed.levels[-1], []
+    place = [k for k, n in enumerate(level.leaves) if n in set(level.unknowns)]
+    for point in points:
+        numbers = np.array([point[n] for n in level.leaves])
+        jacobian = level.jacobian(level.look(numbers)[1])
+        found.append(np.where(level.certainty(numbers) < 0, 0.0, jacobian)[:, place])
+    matrix = np.hstack(found)
+    if not np.all(np.isfinite(matrix)):
+        return None
+    rows, columns = balance(matrix, 1)  # at such points nothing is small by accident
+    sizes = np.linalg.norm(rows * matrix * columns, axis=1, keepdims=True)
+    rows = rows / np.where(sizes > 0, sizes, 1.0)
+    transposed = (rows * matrix * columns).T
+    r, order = cast(tuple[np.ndarray, np.ndarray], qr(transposed, mode="r", pivoting=True))
+    rank = int(np.count_nonzero(np.abs(np.diag(r)) > RANK))
+    if rank == len(matrix):
+        return None
+    factors = np.zeros(len(matrix))
+    factors[order[:rank]] = -solve_triangular(r[:rank, :rank], r[:rank, rank])
+    factors[order[rank]] = 1.0
+    factors[np.abs(factors) <= RANK] = 0.0
+    there = np.flatnonzero(factors)
+    first = min(there, key=lambda i: (indexed.counts[i], -abs(factors[i])))
+    factors *= rows.ravel()
+    return np.array([_fraction(x) for x in factors / factors[first]])
 
-    def _matrices(self, vary: bool) -> list[np.ndarray]:
-        """The Jacobian by the highest derivatives at each point where it is finite, without what is rounding."""
-        level, found = self.level, []
-        for point in self.points(vary):
-            numbers = np.array([point[n] for n in level.leaves])
-            _, slopes = level.look(numbers)
-            if np.all(np.isfinite(slopes)):
-                jacobian = np.where(level.certainty(numbers, slopes) < 0, 0.0, level.jacobian(slopes))
-                found.append(jacobian[:, self._place])
-        return found
 
-    def constant_factors(self, vary: bool) -> np.ndarray | None:
-        """Factors with which the rows vanish at all points, one of the least differentiated having 1; or None."""
-        matrices = self._matrices(vary)
-        return self._factors(np.hstack(matrices)) if matrices else None
-
-    def changing_factors(self) -> np.ndarray | None:
-        """Factors with which the rows vanish at a point."""
-        matrices = self._matrices(vary=False)
-        return self._factors(matrices[0]) if matrices else None
-
-    def _factors(self, matrix: np.ndarray) -> np.ndarray | None:
-        from scipy.linalg import qr, solve_triangular
-
-        rows, columns = balance(matrix, 1)  # at such a point nothing is small by accident
-        sizes = np.linalg.norm(rows * matrix * columns, axis=1, keepdims=True)
-        rows = rows / np.where(sizes > 0, sizes, 1.0)
-        r, order = cast(
-            tuple[np.ndarray, np.ndarray], qr((rows * matrix * columns).T, mode="r", pivoting=True)
-        )
-        rank = int(np.count_nonzero(np.abs(np.diag(r)) > RANK))
-        if rank == len(matrix):
-            return None
-        found = np.zeros(len(matrix))
-        found[order[:rank]] = -solve_triangular(r[:rank, :rank], r[:rank, rank])
-        found[order[rank]] = 1.0
-        found[np.abs(found) <= RANK] = 0.0
-        there = np.flatnonzero(found)
-        least = min(self.counts[i] for i in there)
-        first = max((i for i in there if self.counts[i] == least), key=lambda i: abs(found[i]))
-        found *= rows.ravel()
-        return np.array([_fraction(x) for x in found / found[first]])
-
-    def symbols_of(self, factors: np.ndarray) -> list[str]:
-        """The highest derivatives that cancel."""
-        there = np.any(self._matrices(vary=False)[0][np.flatnonzero(factors)] != 0, axis=0)
-        return [self.level.leaves[k] for k, stands in zip(self._place, there, strict=True) if stands]
-
-    def parameters_of(self, factors: np.ndarray) -> frozenset[str]:
-        """Parameters in the coefficients that cancel."""
-        rows = ca.vertcat(*(self.level.residuals[i] for i in np.flatnonzero(factors)))
-        unknowns = set(self.level.unknowns)
-        x = [leaf for leaf in ca.symvar(rows) if leaf.name() in unknowns]
-        return frozenset(s.name() for s in ca.symvar(ca.jacobian(rows, ca.vertcat(*x)))) & self.parameters
+def _coefficients(indexed: Indexed, factors: np.ndarray) -> frozenset[str]:
+    """Names in the coefficients that cancel."""
+    level = indexed.levels[-1]
+    rows = ca.vertcat(*(level.residuals[i] for i in np.flatnonzero(factors)))
+    x = [leaf for leaf in ca.symvar(rows) if leaf.name() in set(level.unknowns)]
+    return frozenset(leaf.name() for leaf in ca.symvar(ca.jacobian(rows, ca.vertcat(*x))))
 
 
 def _fraction(x: float) -> float:
@@ -212,9 +164,4 @@ def _without_cancelled(parts: ca.SX, factors: np.ndarray, points: Sequence[Mappi
         slopes = np.array(look([point[leaf.name()] for leaf in leaves]))
         cancelled &= np.abs(factors @ slopes) <= NOISE * (np.abs(factors) @ np.abs(slopes))
     gone = [leaf for leaf, zero in zip(leaves, cancelled, strict=True) if zero]
-    if not gone:
-        return total
-    # what does not depend on a symbol may be read at any value of it where it is finite
-    zero, one = (ca.substitute(total, ca.vertcat(*gone), ca.DM([value] * len(gone))) for value in (0.0, 1.0))
-    finite = ca.Function("at", [x], [zero])([points[0][leaf.name()] for leaf in leaves]).is_regular()
-    return zero if finite else one
+    return ca.substitute(total, ca.vertcat(*gone), ca.SX.zeros(len(gone))) if gone else total

@@ -69,21 +69,21 @@ class Level:
 
     @cached_property
     def _exact_slopes(self) -> tuple[np.ndarray, ca.Function]:
-        """Places of the derivatives that hold exact numbers alone, and how large their terms are."""
+        """Places of the derivatives that hold exact numbers alone; these, and how large their terms are."""
         x, _, jacobian = self._symbolic
         slopes = jacobian.nonzeros()
         names = ({leaf.name() for leaf in ca.symvar(slope)} for slope in slopes)
         places = np.array([k for k, held in enumerate(names) if held <= self.exact], dtype=int)
-        sizes = term_sizes([slopes[k] for k in places]) if places.size else []
-        return places, ca.Function("sizes", [x], [ca.vertcat(*sizes)])
+        exact = [slopes[k] for k in places]
+        return places, ca.Function("exact", [x], [ca.vertcat(*exact), ca.vertcat(*term_sizes(exact))])
 
-    def certainty(self, numbers: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-        """Which derivatives by the leaves are sure not to be rounding, 1, or to be it, -1, however small they are."""
-        places, sizes = self._exact_slopes
+    def certainty(self, numbers: np.ndarray) -> np.ndarray:
+        """By residual and leaf whether a derivative is sure not to be rounding, 1, or sure to be, -1."""
+        places, function = self._exact_slopes
         found = np.zeros((len(self.residuals), len(self.leaves)))
-        rows, columns = self.entries
-        sound = np.abs(slopes[places]) > ROUNDING * np.array(sizes(numbers)).ravel()
-        found[rows[places], columns[places]] = np.where(sound, 1, -1)
+        slopes, sizes = (np.array(one).ravel() for one in function(numbers))
+        rows, columns = (side[places] for side in self.entries)
+        found[rows, columns] = np.where(np.abs(slopes) > ROUNDING * sizes, 1, -1)
         return found
 
     @cached_property
@@ -256,38 +256,29 @@ def _solve(
         """Where steps of these sizes lead."""
         return newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)[0]
 
-    def left_at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What is left at a point, which equations do not hold, and the Jacobian."""
+    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is left at a point, which equations do not hold, and which not even but for rounding."""
         f, jacobian = at(point)
-        bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
-        left = np.flatnonzero(bad)
+        off = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+        left = np.flatnonzero(off)
         if left.size and np.all(np.isfinite(f)):
-            bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        return f, bad, jacobian
-
-    def but_for_rounding(found, point: np.ndarray, sizes: np.ndarray | float) -> np.ndarray:
-        """Which equations do not hold if unknowns have the rounding of the largest of them, in their sizes."""
-        f, bad, jacobian = found
+            off[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
+        # unknowns that are solved together have the rounding of the largest, in their sizes
         rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
-        return bad & ~(np.abs(f) <= ROUNDING * rounding)
+        return f, off, off & ~(np.abs(f) <= ROUNDING * rounding)
 
-    point = led(1.0, 1.0)
-    found = left_at(point)
-    if np.any(found[1]):
-        around[columns] = start
-        certainty = level.certainty(around, level.look(around)[1])[:, columns]
-        rows, sizes = balance(at(start)[1], certainty)
-        first, held = found, but_for_rounding(found, point, 1.0)
-        if np.any(rows != 1) or np.any(sizes != 1):  # others than metres, radians and newtons
+    point = led(1.0, 1.0)  # sizes of metres, radians and newtons
+    f, off, bad = left_at(point, 1.0)
+    if np.any(off):
+        jacobian = at(start)[1]
+        rows, sizes = balance(jacobian, level.certainty(around)[:, columns])
+        if np.any(rows != 1) or np.any(sizes != 1):
             other = led(rows, sizes)
-            found = left_at(other)
-            bad = but_for_rounding(found, other, sizes) if np.any(found[1]) else found[1]
+            f_other, off, bad_other = left_at(other, sizes)
             # where both hold but for rounding, the point where less is left
-            worse = np.linalg.norm(rows.ravel() * first[0]) >= np.linalg.norm(rows.ravel() * found[0])
-            if np.any(held) or not np.any(found[1]) or (worse and not np.any(bad)):
-                point, first, held = other, found, bad
-        found = (first[0], held, first[2])
-    f, bad, _ = found
+            less = np.linalg.norm(rows.ravel() * f_other) <= np.linalg.norm(rows.ravel() * f)
+            if np.any(bad) or not np.any(off) or (less and not np.any(bad_other)):
+                point, f, bad = other, f_other, bad_other
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
