@@ -21,7 +21,8 @@ from gantrytau import (
     sin,
     translate,
 )
-from gantrytau.mechanics import translational
+from gantrytau.mechanics import rotational, translational
+from gantrytau.mechanics.gears import IdealGear
 from gantrytau_models import FourBar, Pendulum
 
 
@@ -195,3 +196,26 @@ def test_factors_of_any_size(k):
     at = translate(Multiples(k=k)).evaluate({"x": 0.5})
     assert at["y"] / k == pytest.approx(0.5, rel=1e-12)
     assert at["z"] == pytest.approx(1.0, rel=1e-12)
+
+
+class Train(Model):
+    """Three wheels behind two gears, driven by 1 N m."""
+
+    ratio = Parameter(1.0, unit="1")
+    drive = rotational.Torque(tau=1.0)
+    a, b, c = rotational.Inertia(J=1.0), rotational.Inertia(J=1.0), rotational.Inertia(J=2.0)
+    near, far = IdealGear(ratio=ratio), IdealGear(ratio=ratio)
+
+    def equations(self):
+        yield connect(self.drive.flange, self.a.flange_a)
+        yield connect(self.a.flange_b, self.near.flange_a)
+        yield connect(self.near.flange_b, self.b.flange_a)
+        yield connect(self.b.flange_b, self.far.flange_a)
+        yield connect(self.far.flange_b, self.c.flange_a)
+
+
+@pytest.mark.parametrize("ratio", [1e-9, 1e9])
+def test_gear_trains_of_any_ratio_at_any_tolerance(ratio):
+    inertia = 1 + 1 / ratio**2 + 2 / ratio**4
+    result = simulate(Train(ratio=ratio), stop=1.0, points=3, tolerance=1e-15)
+    assert result.final("a.w") == pytest.approx(1 / inertia, rel=1e-12)

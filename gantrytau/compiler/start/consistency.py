@@ -11,6 +11,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.start.balance import balance
 from gantrytau.errors import InitializationError
 from gantrytau.language.piecewise import switched, with_modes
@@ -72,10 +73,10 @@ class Level:
         """Places of the derivatives that hold exact numbers alone; these, and how large their terms are."""
         x, _, jacobian = self._symbolic
         slopes = jacobian.nonzeros()
-        names = ({leaf.name() for leaf in ca.symvar(slope)} for slope in slopes)
-        places = np.array([k for k, held in enumerate(names) if held <= self.exact], dtype=int)
+        others = column([leaf for leaf in x.elements() if leaf.name() not in self.exact])
+        places = np.setdiff1d(range(len(slopes)), ca.jacobian_sparsity(column(slopes), others).row())
         exact = [slopes[k] for k in places]
-        return places, ca.Function("exact", [x], [ca.vertcat(*exact), ca.vertcat(*term_sizes(exact))])
+        return places, ca.Function("exact", [x], [column(exact), column(term_sizes(exact) if exact else [])])
 
     def certainty(self, numbers: np.ndarray) -> np.ndarray:
         """By residual and leaf whether a derivative is sure not to be rounding, 1, or sure to be, -1."""
