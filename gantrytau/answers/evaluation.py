@@ -105,7 +105,7 @@ def _jointly(
     if not late:
         raise error  # all that is held are positions, which have been tried
     whole = dae.indexed.whole
-    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free))
+    level = Level(whole.residuals, whole.names, (*whole.unknowns, *free), whole.exact)
     try:
         found = solve_levels([level], guess.values, held=held, started=guess.started | held, title=dae.name)
     except InitializationError:
@@ -116,6 +116,7 @@ def _jointly(
 def given_scalars(dae: Translated, given: Mapping[str, Any]) -> dict[str, float]:
     """Values by scalar name; ModelError for unknown names, wrong shapes and numbers that are not finite."""
     found: dict[str, float] = {}
+    dae.flat.refuse_twice("given", given)
     for name, value in given.items():
         elements, value = dae.expand(name), in_si(name, value, dae.flat.unit(name))
         found.update(zip(elements, elements_of(name, value, dae.flat.shape(name)), strict=True))

@@ -306,6 +306,8 @@ class _Elimination:
                 stack.append((node.dep(1), factor * float(node.dep(0))))
             elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor * float(node.dep(1))))
+            elif node.is_op(ca.OP_DIV) and node.dep(1).is_constant():
+                stack.append((node.dep(0), factor / float(node.dep(1))))
             elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
                 terms.shift(factor, node)
             else:
@@ -375,11 +377,8 @@ class _Elimination:
             if name in self.parents:
                 alias = self.root(name, order)
                 old.append(leaf)
-                new.append(self.expression(alias))
+                new.append(alias_expression(alias, self.chains))
         return ca.substitute(vector, ca.vertcat(*old), ca.vertcat(*new)).elements() if old else residuals
-
-    def expression(self, alias: Alias) -> ca.SX:
-        return alias_expression(alias, self.chains)
 
 
 def _plus(total: ca.SX, factor: float, offset: ca.SX) -> ca.SX:

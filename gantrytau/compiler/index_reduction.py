@@ -28,13 +28,15 @@ class Indexed:
     """The equations with all their derivatives that are needed.
 
     residuals: by (equation, times differentiated); names: of the equations; counts: how often each
-    equation is differentiated; orders: highest derivative of each unknown, by name; structural_index as Pryce defines it.
+    equation is differentiated; orders: highest derivative of each unknown, by name; exact: names of parameters and of
+    what is known; structural_index as Pryce defines it.
     """
 
     residuals: Mapping[Key, ca.SX]
     names: tuple[str, ...]
     counts: tuple[int, ...]
     orders: Mapping[str, int]
+    exact: frozenset[str] = frozenset()
 
     @cached_property
     def incidence(self) -> Mapping[Key, tuple[Derivative, ...]]:
@@ -62,7 +64,8 @@ class Indexed:
             keys = [(i, stage + c) for i, c in enumerate(self.counts) if stage + c >= 0]
             unknowns = [derivative_name(n, stage + top) for n, top in self.orders.items() if stage + top >= 0]
             words = [self.names[i] + (f", differentiated {m} times" if m else "") for i, m in keys]
-            found.append(Level(tuple(self.residuals[k] for k in keys), tuple(words), tuple(unknowns)))
+            rows = tuple(self.residuals[k] for k in keys)
+            found.append(Level(rows, tuple(words), tuple(unknowns), self.exact))
         return tuple(found)
 
     @cached_property
@@ -72,6 +75,7 @@ class Indexed:
             tuple(r for level in self.levels for r in level.residuals),
             tuple(n for level in self.levels for n in level.names),
             tuple(n for level in self.levels for n in level.unknowns),
+            self.exact,
         )
 
     def unknown_symbols(self) -> list[str]:
@@ -91,7 +95,8 @@ def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) 
     residuals = _differentiated(reduced, counts)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     names = tuple(e.name for e in reduced.equations)
-    return Indexed(residuals, names, tuple(int(c) for c in counts), orders)
+    exact = frozenset((*reduced.table.independent, *reduced.known, flat.time.name()))
+    return Indexed(residuals, names, tuple(int(c) for c in counts), orders, exact)
 
 
 def _offsets(reduced: Reduced, rows: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):

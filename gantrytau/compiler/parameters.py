@@ -57,6 +57,7 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
     for name in values:
         if name not in known:
             raise ModelError(f"{flat.name} has no parameter '{name}'{_remedy(flat, name, known)}")
+    flat.refuse_twice("parameters", values)
     return replace(flat, parameters=tuple(_with_value(p, remaining) for p in flat.parameters))
 
 

@@ -220,6 +220,15 @@ def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, lea
     )
 
 
+def held_together(title: str, names: Sequence[str], why: str) -> StructureError:
+    """Equations that hold the same combination of unknowns, the highest derivatives of variables."""
+    shown = " and ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+    return StructureError(
+        f"{title}: {shown} hold their highest derivatives in the same combination, and {why}. Expected equations from which "
+        "each of these follows: write one of them without these, or replace the one that repeats the others"
+    )
+
+
 def overdriven(flat: FlatModel, inputs: Sequence[str], against: Sequence[str]) -> StructureError:
     """Constraints that hold only as long as the inputs happen to agree."""
     return StructureError(

@@ -6,6 +6,7 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
+from gantrytau.compiler.blocks.cancellation import combined
 from gantrytau.compiler.blocks.determinacy import massless, refuse_undetermined
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
@@ -101,6 +102,56 @@ def _translated(
     """From the flat model without redundant constraints to the sorted system."""
     reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     wanted = _wanted_derivatives(flat, request.find)
+    try:
+        return _sorted(settled, flat, reduced, known, request, start)
+    except (InitializationError, StructureError) as error:
+        reduced, decisive = combined(reduced, flat, wanted, error)
+        if decisive & _loose(flat, request):
+            raise
+        try:
+            if decisive:
+                return _shaped(settled, flat, decisive, known, request, start)
+            return _sorted(settled, flat, reduced, known, request, start)
+        except StructureError:
+            if isinstance(error, StructureError):
+                raise error from None
+            raise
+
+
+def _shaped(
+    settled: Settled,
+    flat: FlatModel,
+    names: frozenset[str],
+    known: tuple[str, ...],
+    request: Request,
+    start: Mapping[str, float],
+) -> Translated:
+    """The same with the values of some more parameters folded in, as they decide on the structure."""
+
+    def folded(one: FlatModel) -> FlatModel:
+        parameters = (replace(p, fold=p.fold or not names.isdisjoint(p.elements)) for p in one.parameters)
+        return replace(one, parameters=tuple(parameters))
+
+    flat, settled = folded(flat), replace(settled, flat=folded(settled.flat))
+    return _translated(settled, flat, _given(flat, request.given)[0], known, request, start)
+
+
+def _loose(flat: FlatModel, request: Request) -> set[str]:
+    """Parameters that have to stay symbols."""
+    given = {n for name in request.given for n in flat.expand(name)}
+    return given | {n for p in flat.parameters if p.free for n in p.elements}
+
+
+def _sorted(
+    settled: Settled,
+    flat: FlatModel,
+    reduced: Reduced,
+    known: tuple[str, ...],
+    request: Request,
+    start: Mapping[str, float],
+) -> Translated:
+    """The reduced equations differentiated, started and solved block by block."""
+    wanted = _wanted_derivatives(flat, request.find)
     indexed = reduce_index(reduced, flat, wanted)
     _refuse_differentiated(flat, reduced, indexed, wanted)
     asked = start_values(flat, reduced, indexed.symbols(reduced.known))
@@ -115,14 +166,14 @@ def _translated(
     unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
     pattern = block_pattern(indexed.incidence, unknowns)
     by_name = {n: reduced.chains.named(n) for n in unknowns}
-    guide = Guide(sample, table.values, choice.states)
+    guide = Guide(sample, reduced.table.values, choice.states)
     blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
     refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
     found = Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )
-    _refuse_reinits(found)
-    return found
+    decisive = _refuse_reinits(found)
+    return _shaped(settled, flat, decisive, known, request, start) if decisive else found
 
 
 def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
@@ -143,16 +194,25 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
     return found
 
 
-def _refuse_reinits(dae: Translated) -> None:
-    """ModelError for a variable that a when gives a new value although it is no state, or is one by another name."""
+def _refuse_reinits(dae: Translated) -> frozenset[str]:
+    """ModelError for a variable that a when gives a new value although it is no state, or is one by another name.
+
+    A variable behind an equation of two unknowns may be a multiple of a state: the parameters that decide on it.
+    """
     owners: dict[str, str] = {}
     for one in dae.flat.whens:
         for name, _ in one.reinits:
             symbol = dae.reduced.aliases[name].symbol
             if symbol not in dae.choice.states:
+                keys = next((b.equations for b in dae.blocks if b.unknowns == (symbol,)), ())
+                leaves = {s.name() for k in keys for s in ca.symvar(dae.indexed.residuals[k])}
+                decisive = leaves.intersection(dae.table.independent)
+                if decisive and len(leaves - decisive) == 2 and not decisive & _loose(dae.flat, dae.request):
+                    return frozenset(decisive)
                 raise no_reinit(one.label, name, dae.states)
             if owners.setdefault(symbol, name) != name:
                 raise twice_reinit(one.label, name, owners[symbol])
+    return frozenset()
 
 
 def retranslate(dae: Translated, flat: FlatModel) -> Translated:

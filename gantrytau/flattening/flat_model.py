@@ -1,6 +1,6 @@
 """The record of a flattened model: what crosses from the language to the compiler."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -226,6 +226,17 @@ class FlatModel(Record):
             raise ModelError(f"{self.name}: {base} does not exist: {self.absent[base]}")
         known = dict.fromkeys(n for v in self.vectors.values() for n in (v.name, *v.elements))
         raise ModelError(f"{self.name} has no variable or parameter '{name}'{did_you_mean(base, known)}")
+
+    def refuse_twice(self, place: str, names: Iterable[str]) -> None:
+        """ModelError where several of these names give one scalar, as a vector and an element of it do."""
+        owners: dict[str, str] = {}
+        for name in names:
+            for scalar in self.expand(name):
+                if owners.setdefault(scalar, name) != name:
+                    raise ModelError(
+                        f"{place}: found {owners[scalar]} and {name}, which both give {scalar}, expected one value for it; "
+                        "leave one of them out",
+                    )
 
     def unit(self, name: str) -> str | None:
         """The unit of what `expand` lists, None where none is declared."""

@@ -13,6 +13,7 @@ from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.singular_poses import Point
 
 MOST_STEPS = 100_000  # of the integrator between two ends
+FINEST = 5e-16  # tolerance that CVODES takes
 WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
 
 
@@ -24,7 +25,7 @@ class Integrators:
 
     def __init__(self, coordinates: Coordinates, tolerance: float, longest: float | None, interval: float):
         """longest: step anywhere, s; interval: the longest between two places, s."""
-        self.coordinates, self.tolerance = coordinates, tolerance
+        self.coordinates, self.tolerance = coordinates, max(tolerance, FINEST)
         self.sizes = np.array(coordinates.sizes or [1.0] * len(coordinates.states))
         self.pressed = self.working = False
         self.longest, self.interval = longest, interval

@@ -59,6 +59,15 @@ class Node:
         return self.operation == "neg" or (self.operation == "number" and float(self.value) < 0)
 
 
+def whole_power(node: Node) -> tuple[Node, float]:
+    """A node as a whole power, above zero, of another."""
+    if node.operation == "pow" and node.arguments[1].operation == "number":
+        power = float(node.arguments[1].value)
+        if power > 0 and power.is_integer():
+            return node.arguments[0], power
+    return node, 1.0
+
+
 class Graph:
     """Nodes without duplicates; `nodes` has each after its arguments."""
 
@@ -229,7 +238,10 @@ class Graph:
             return a
         if b.operation == "mul" and b.arguments[0].operation == "number" and a.operation != "number":
             return self.node("mul", b.arguments[0], self.multiply(a, b.arguments[1]))
-        return self.node("pow", a, self.number(2.0)) if a is b else self.node("mul", a, b)
+        (base, power), (other, more) = whole_power(a), whole_power(b)
+        if base is other and base.operation != "number":
+            return self.node("pow", base, self.number(power + more))
+        return self.node("mul", a, b)
 
     def divide(self, a: Node, b: Node) -> Node:
         """The quotient a / b."""

@@ -204,3 +204,18 @@ def test_several_solutions_of_a_switch_are_told_by_name():
     found = check(Backwards())
     assert found.ambiguous == ("x (3)",)
     assert "several solutions at the start, of which the nearest is taken:\n    x (3)" in str(found)
+
+
+def test_the_branch_of_the_start_goes_on_behind_a_kink(tmp_path):
+    class Rising(Model):
+        u = Input(start=0.0)
+        x = Real(start=1.0)
+
+        def equations(self):
+            yield self.x**2 + self.x + fmax(self.x, 0) + fmin(self.x, 3) == self.u
+
+    expected = [np.sqrt(u - 2) - 1 for u in (20.0, 40.0)]  # beyond 3, x^2 + 2 x + 3 = u
+    for route, values in answers(
+        translate(Rising()), [{"u": np.array([u])} for u in (20.0, 40.0)], ["x"], tmp_path
+    ).items():
+        assert values.ravel() == pytest.approx(expected, rel=1e-9), route

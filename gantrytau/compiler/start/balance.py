@@ -6,16 +6,17 @@ whole thousands, so that models of usual sizes are treated as they are.
 
 import numpy as np
 
-NOISE = 1e-13  # of the largest entry of a row and of a column, below which an entry is rounding
+NOISE = 1e-13  # of the largest entry of a row and of a column, below which an entry counts as rounding
 ROUNDS = 30
 
 
-def balance(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Factors of rows and of columns, (m, 1) and (n,)."""
+def balance(matrix: np.ndarray, certainty: np.ndarray | int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Factors of rows and of columns, (m, 1) and (n,); certainty: -1 of rounding, 1 of what is none."""
     size = np.abs(np.nan_to_num(matrix))
     there = (size > NOISE * size.max(axis=0, initial=0.0)) & (
         size > NOISE * size.max(axis=1, keepdims=True, initial=0.0)
     )
+    there = ((there & (certainty >= 0)) | (certainty > 0)) & (size > 0)
     logs = np.where(there, np.log10(np.where(there, size, 1.0)), 0.0)
     rows, columns = np.zeros((len(matrix), 1)), np.zeros(matrix.shape[1])
     in_row, in_column = np.maximum(there.sum(axis=1, keepdims=True), 1), np.maximum(there.sum(axis=0), 1)

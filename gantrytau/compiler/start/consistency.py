@@ -11,6 +11,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.start.balance import balance
 from gantrytau.errors import InitializationError
 from gantrytau.language.piecewise import switched, with_modes
@@ -36,11 +37,12 @@ LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Equations that are solved together: residuals, and symbols that may move."""
+    """Equations that are solved together: residuals, and symbols that may move; exact: those whose numbers are given."""
 
     residuals: tuple[ca.SX, ...]
     names: tuple[str, ...]  # of the residuals, for messages
     unknowns: tuple[str, ...]
+    exact: frozenset[str] = frozenset()
 
     @cached_property
     def leaves(self) -> tuple[str, ...]:
@@ -65,6 +67,25 @@ class Level:
         """Rows and columns of the derivatives that are not structurally zero."""
         rows, columns = self._symbolic[2].sparsity().get_triplet()
         return np.array(rows, dtype=int), np.array(columns, dtype=int)
+
+    @cached_property
+    def _exact_slopes(self) -> tuple[np.ndarray, ca.Function]:
+        """Places of the derivatives that hold exact numbers alone; these, and how large their terms are."""
+        x, _, jacobian = self._symbolic
+        slopes = jacobian.nonzeros()
+        others = column([leaf for leaf in x.elements() if leaf.name() not in self.exact])
+        places = np.setdiff1d(range(len(slopes)), ca.jacobian_sparsity(column(slopes), others).row())
+        exact = [slopes[k] for k in places]
+        return places, ca.Function("exact", [x], [column(exact), column(term_sizes(exact) if exact else [])])
+
+    def certainty(self, numbers: np.ndarray) -> np.ndarray:
+        """By residual and leaf whether a derivative is sure not to be rounding, 1, or sure to be, -1."""
+        places, function = self._exact_slopes
+        found = np.zeros((len(self.residuals), len(self.leaves)))
+        slopes, sizes = (np.array(one).ravel() for one in function(numbers))
+        rows, columns = (side[places] for side in self.entries)
+        found[rows, columns] = np.where(np.abs(slopes) > ROUNDING * sizes, 1, -1)
+        return found
 
     @cached_property
     def _function(self) -> ca.Function:
@@ -189,7 +210,7 @@ def _solve_switching(
     def read(numbers: Mapping[str, float]) -> tuple[float, ...]:
         return tuple(np.array(modes([numbers[n] for n in level.leaves])).ravel().tolist())
 
-    smooth = Level(found.expressions, level.names, level.unknowns)
+    smooth = Level(found.expressions, level.names, level.unknowns, level.exact)
     waiting, seen = [read(values)], set[tuple[float, ...]]()
     while waiting and len(seen) < MOST_PIECES:
         chosen = waiting.pop(0)
@@ -236,31 +257,29 @@ def _solve(
         """Where steps of these sizes lead."""
         return newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)[0]
 
-    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-        """What is left at a point, and which equations do not hold."""
+    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is left at a point, which equations do not hold, and which not even but for rounding."""
         f, jacobian = at(point)
-        bad = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
-        if np.any(bad) and usual:
-            # unknowns that are solved together have the rounding of the largest, in their sizes
-            rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
-            bad &= ~(np.abs(f) <= ROUNDING * rounding)
-        left = np.flatnonzero(bad)
+        off = ~(np.abs(f) <= SOLVED * (np.abs(jacobian) @ np.abs(point)))
+        left = np.flatnonzero(off)
         if left.size and np.all(np.isfinite(f)):
-            bad[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        return f, bad
+            off[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
+        # unknowns that are solved together have the rounding of the largest, in their sizes
+        rounding = np.abs(jacobian * sizes).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
+        return f, off, off & ~(np.abs(f) <= ROUNDING * rounding)
 
-    rows, sizes = balance(at(start)[1])
-    usual = not np.any(sizes != 1)  # sizes of metres, radians and newtons
-    point = led(1.0, 1.0)
-    f, bad = left_at(point, 1.0)
-    if np.any(bad) and not usual:
-        usual, first = True, point
-        point = led(rows, sizes)
-        f, bad = left_at(point, sizes)
-        f_first, bad_first = left_at(first, sizes)
-        # where both hold but for rounding, the point where less is left
-        if not np.any(bad_first) and np.linalg.norm(rows * f_first) < np.linalg.norm(rows * f):
-            point, f, bad = first, f_first, bad_first
+    point = led(1.0, 1.0)  # sizes of metres, radians and newtons
+    f, off, bad = left_at(point, 1.0)
+    if np.any(off):
+        jacobian = at(start)[1]
+        rows, sizes = balance(jacobian, level.certainty(around)[:, columns])
+        if np.any(rows != 1) or np.any(sizes != 1):
+            other = led(rows, sizes)
+            f_other, off, bad_other = left_at(other, sizes)
+            # where both hold but for rounding, the point where less is left
+            less = np.linalg.norm(rows.ravel() * f_other) <= np.linalg.norm(rows.ravel() * f)
+            if np.any(bad) or not np.any(off) or (less and not np.any(bad_other)):
+                point, f, bad = other, f_other, bad_other
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
@@ -326,7 +345,7 @@ def newton(
 def _longest(point: np.ndarray, step: np.ndarray) -> float:
     """The share of a step that may be taken at once."""
     reach = np.maximum(LONGEST_STEP, np.abs(point))
-    return float(np.min(reach / np.maximum(np.abs(step), 1e-300), initial=1.0))
+    return float(1.0 / np.max(np.abs(step) / reach, initial=1.0))
 
 
 def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray:

@@ -59,7 +59,7 @@ def _consistent_start(
     stages = list(indexed.levels)
     if free:
         last = stages[-1]
-        stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free))
+        stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free), last.exact)
     title, fixed = flat.name, guess.fixed | held
     started, thorough = guess.started | held, not held
     try:
@@ -111,4 +111,5 @@ def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Le
         tuple(n for s in stages for n in s.names)
         + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
         tuple(n for s in stages for n in s.unknowns),
+        frozenset(reduced.table.independent),
     )

@@ -24,6 +24,7 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
     """
     if not isinstance(starts, Mapping):
         raise ModelError(f"starts: found {starts!r}, expected {{name: value}}", argument="starts")
+    dae.flat.refuse_twice("starts", starts)
     values, given = dict(dae.start), dict[str, str]()
     for name, value in starts.items():
         elements = _variables(dae, name)
