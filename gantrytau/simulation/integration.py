@@ -66,7 +66,7 @@ class Run:
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics, and what is sampled and held, at the output points that were reached."""
         trail = self.trail
-        kept = trail.kept[trail.kept <= self.done]
+        kept = np.flatnonzero(trail.kept[: self.done + 1])
         return trail.t[kept], trail.x[kept], trail.z[kept], trail.rows(kept)
 
     @property
