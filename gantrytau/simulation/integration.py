@@ -10,6 +10,7 @@ from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.changes import SHORT, Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
+from gantrytau.simulation.events.looks import Looks
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -24,13 +25,9 @@ CHUNK = 10  # output intervals between two projections onto the constraints, or 
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
 REST = 10.0  # times the tolerance: what may be left of a margin
 GROWTH = 10  # of a stretch in which nothing has switched
-STEPS_BETWEEN = (
-    8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
-)
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
-REFINED = 50  # intervals ahead that are divided as well
 
 
 class Run:
@@ -59,6 +56,7 @@ class Run:
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
+        self.looks = Looks(coordinates, self.trail)
         sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
         self.history = PastValues(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
         self.sampler = sampler if sampler.suits else None
@@ -194,7 +192,9 @@ class Run:
         courses = self._courses(here, count) if self.coordinates.stepwise else None
         self.integrators.shorter = self._shorter()
         x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
-        if self._too_wide(count):
+        steps = self.integrators.steps - STARTING * (count if self.history else 1)
+        least = self.integrators.shorter or 0.0  # steps kept short say nothing
+        if self.looks.by_steps(here, count, steps, least):
             return False
         reached = ahead[1:]
         inputs = trail.rows(reached)
@@ -205,25 +205,14 @@ class Run:
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         if self.history and self.history.too_wide(here, count):
             return False
-        found = self._crossing(ahead)
+        gaps = self._gaps(ahead)
+        found = None if gaps is None else first_crossing(trail.t[ahead], gaps)
+        if gaps is not None and self.looks.by_margins(ahead, gaps, found):
+            return False
         self.done = here + count if found is None else here + found.place
         self._watch(here, self.done)
         self._hold_together(reached)
         return found is not None and self._cross(found)
-
-    def _too_wide(self, count: int) -> bool:
-        """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
-        starts = count if self.history else 1  # of the integrator
-        parts = (self.integrators.steps - STARTING * starts) // (STEPS_BETWEEN * count)
-        if parts < 2 or not len(self.coordinates.switches):
-            return False
-        trail, here, last = self.trail, self.done, self.trail.last
-        least = max(SHORT**2 * self.span, self.integrators.shorter or 0.0)  # steps kept short say nothing
-        for k in reversed(range(here, min(here + max(count, REFINED), last))):
-            times = np.linspace(trail.t[k], trail.t[k + 1], int(parts) + 1)[1:-1]
-            if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > least):
-                trail.insert(k, times)
-        return trail.last > last
 
     def _courses(self, here: int, count: int) -> np.ndarray:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
@@ -237,13 +226,10 @@ class Run:
         inputs = trail.rows(np.arange(here, here + count)).T
         return np.vstack([trail.t[here : here + count], h, np.arange(count), inputs])
 
-    def _crossing(self, places: np.ndarray) -> Crossing | None:
-        """The first interval between successive places in which something switches."""
+    def _gaps(self, places: np.ndarray) -> Margins | None:
+        """How far from its next turn each switch is at successive places."""
         switches = self.coordinates.switches
-        if not len(switches):
-            return None
-        gaps = switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
-        return first_crossing(self.trail.t[places], gaps)
+        return switches.gaps(self.changes.margins(places), self.changes.modes(places[0])) if len(switches) else None
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
@@ -256,14 +242,15 @@ class Run:
                 switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes
             )
 
-        if found.certain:
-            there = located(low, float(trail.t[k + 1]), found.guess, self.integrators.step, look)
-        else:
-            there = self.integrators.step(low, found.guess - low[2])
-            gaps = look(there)
-            if np.any(gaps.values < -gaps.noise):
-                there = located(low, found.guess, found.guess, self.integrators.step, look)
-        trail.insert(k, np.array([there[2]]))
+        there = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
+        gaps = look(there)
+        if np.any(gaps.values < -gaps.noise):
+            there = located(low, there, found.guess, self.integrators.step, look)
+        if there is None:
+            turned = self.changes.conditions(switches.of_gaps(np.any(gaps.values < -gaps.noise, axis=0)))
+            raise RuntimeError(f"no step leads to where {' and '.join(turned)} turns")
+        if there[2] < trail.t[k + 1]:
+            trail.insert(k, np.array([there[2]]))
         trail.x[k + 1], trail.z[k + 1] = there[:2]
         self.done = k + 1
         gaps = look(there)

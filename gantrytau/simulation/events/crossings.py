@@ -57,22 +57,22 @@ def _zero(a: float, b: float, c: float, d: float) -> float:
 
 def located(
     low: Point,
-    end: float,
+    high: Point,
     guess: float,
     step: Callable[[Point, float], Point],
     look: Callable[[Point], Margins],
-) -> Point:
-    """The point just behind the first crossing after `low`, which lies before the time `end`.
+) -> Point | None:
+    """The point just behind the first crossing after `low`, up to `high`, which lies behind it; None if no step leads there.
 
     step: the point some seconds later, RuntimeError or SolveError where there is none. Newton steps on the gaps,
     each from the last point before the crossing, so that what is left to go is found to the rounding of time.
     """
-    high: Point | None = None
+    end = high[2]  # up to which steps lead
     width = end - low[2]
     for count in range(MOST):
         least = 4 * np.spacing(max(abs(low[2]), abs(end)))
-        if end - low[2] <= least and high is not None:
-            return high
+        if end - low[2] <= least:
+            break
         if not low[2] + least / 4 < guess < end or (count % 4 == 3 and end - low[2] > width / 8):
             guess = (low[2] + end) / 2
         width = end - low[2] if count % 4 == 3 else width
@@ -96,6 +96,4 @@ def located(
         with np.errstate(divide="ignore", invalid="ignore"):
             waits = np.where(falling, (left + gaps.noise[0]) / -gaps.rates[0], np.inf)
         guess = there[2] + float(np.min(waits, initial=np.inf))
-    if high is None:
-        raise SolveError("the crossing is not reached", time=low[2])
-    return high
+    return high if end == high[2] else None

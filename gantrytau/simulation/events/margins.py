@@ -121,10 +121,14 @@ class Switches:
             np.hstack([margins.noise, margins.noise[:, counts]]),
         )
 
+    def of_gaps(self, chosen: np.ndarray) -> np.ndarray:
+        """The switches of some columns of `gaps`."""
+        return np.append(np.arange(len(self)), np.flatnonzero(self._counts))[chosen]
+
     def behind(self, gap: int, point: Point, modes: np.ndarray, size: np.ndarray) -> np.ndarray:
         """The states moved by the shortest way to just behind where a gap is zero."""
         x, z, t, w = point
-        index = gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
+        index = int(self.of_gaps(np.array([gap]))[0])
         slopes = np.array(self._slopes(x, z, t, t, w))[index]
         for _ in range(2):
             margins = self.look(x[None], z[None], np.array([t]), w[None], size)
