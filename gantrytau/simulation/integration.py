@@ -8,9 +8,9 @@ from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
-from gantrytau.simulation.events.changes import SHORT, Changes
+from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
-from gantrytau.simulation.events.looks import Looks
+from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -170,9 +170,10 @@ class Run:
             return False
         close = closing & (left <= REST * self.integrators.tolerance * scale)
         if not close.any():
-            if h > SHORT**2 * self.span:
+            wide = h > LEAST_INTERVAL * np.spacing(abs(trail.t[k + 1]))
+            if wide:
                 trail.insert(k, np.array([trail.t[k] + h / 2]))
-            return bool(h > SHORT**2 * self.span)
+            return bool(wide)
         for gap in np.flatnonzero(close):
             trail.x[k] = switches.behind(
                 int(gap), self.changes.point(k), self.changes.modes(k), self.changes.sizes

@@ -18,12 +18,10 @@ from gantrytau.simulation.events.sticking import HOLDS, WHENS
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.singular_poses import Point
-from gantrytau.simulation.trail import LEAST_STEPS, Trail
+from gantrytau.simulation.trail import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
-SAME_INSTANT = 50  # events within SHORT of the run: chattering
-SHORT = 1e-9
-MOST_EVENTS = 500  # in a 500th of the run
+CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
 HOP = (
     1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
 )
@@ -38,7 +36,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self.events: list[float] = []  # times at which states made something switch
+        self._turned: dict[int, tuple[float, float, int]] = {}  # switch: last time, rate behind it, hops
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -136,7 +134,7 @@ class Changes:
                 if k > left and not sampled and switches.jumped(self.point(left), self.point(k)):
                     trail.show(left, k)
             if by_states:
-                self._count(self.modes(k), first, float(trail.t[k]))
+                self._watch_chatter(k, self.modes(k) != first, margins)
         k = self._act(left, k)
         end = self.by_time.next(float(trail.t[k]), trail.inputs(k))
         if end is not None and not self.ended:
@@ -322,14 +320,18 @@ class Changes:
         trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 
-    def _count(self, modes: np.ndarray, before: np.ndarray, t: float) -> None:
-        """SolveError if states made something switch too often."""
-        events = self.events
-        events.append(t)
-        for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
-            if len(events) > many and t - events[-many] < share * self.span:
-                conditions = self.conditions(np.flatnonzero(modes != before))
-                raise run_ends.chattering(self.coordinates.dae, t, conditions)
+    def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
+        """SolveError if what states made switch turns again and again, and does not leave zero in between."""
+        t, after = float(self.trail.t[k]), self.margins(np.array([k]))
+        whole = self.coordinates.switches.whole(before.values)
+        turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
+        for i in turned.tolist():
+            last, rate, hops = self._turned.get(i, (-np.inf, 0.0, 0))
+            away = max(abs(rate), abs(before.rates[0, i])) * (t - last) / 4
+            hops = hops + 1 if away < HOP * before.noise[0, i] else 0
+            self._turned[i] = t, float(after.rates[0, i]), hops
+            if hops >= CHATTERS:
+                raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
 
 
 def _at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:

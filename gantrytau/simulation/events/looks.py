@@ -7,11 +7,11 @@ next, and the cubic through the values and rates at two looks foretells the one 
 import casadi as ca
 import numpy as np
 
-from gantrytau.language.instructions import computed
 from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.events.crossings import Crossing
 from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.phases import moved, phases
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.trail import Trail
 
@@ -19,26 +19,8 @@ STEPS_BETWEEN = 8  # of the integrator between two looks: more, and they are lai
 AHEAD = 50  # intervals that are divided as well
 FINER = 4  # parts of an interval across which a margin goes otherwise than foretold
 RESOLVED = 1e6  # times rounding: a margin that is no larger foretells nothing
-ROUNDING = 64  # of time: two looks are farther apart
+LEAST_INTERVAL = 64  # times the rounding of time: two looks are farther apart
 MOST_PARTS = 1000  # of an interval at once
-SHARE = np.pi / 4  # of a radian's turn 2 pi, that an argument may move between two looks
-PERIODIC = {ca.OP_SIN: 1.0, ca.OP_COS: 1.0, ca.OP_TAN: 2.0}  # periods of 2 pi and pi
-
-
-def phases(expressions: ca.SX, moving: ca.SX) -> ca.SX:
-    """The arguments of periodic functions in expressions that depend on some symbols, (n,), in periods of 2 pi."""
-    leaves = ca.symvar(expressions)
-    found: dict[int, ca.SX] = {}
-
-    def operation(operator: int, operands: list[ca.SX]) -> ca.SX:
-        if operator in PERIODIC and ca.depends_on(operands[0], moving):
-            found[operands[0].element_hash()] = PERIODIC[operator] * operands[0]
-        return ca.SX.unary(operator, *operands) if len(operands) == 1 else ca.SX.binary(operator, *operands)
-
-    function = ca.Function("periodic", leaves, [ca.densify(expressions)], {"cse": True})
-    if any(function.instruction_id(k) in PERIODIC for k in range(function.n_instructions())):
-        computed(function, lambda k, _: leaves[k], ca.SX, operation)
-    return ca.vertcat(ca.SX(0, 1), *found.values())
 
 
 class Looks:
@@ -67,14 +49,12 @@ class Looks:
         ahead = np.zeros(0, dtype=int)
         if self._phases is not None:
             point = trail.x[places], trail.z[places], t[:, None], t[:, None], trail.rows(places)
-            values, rates = (np.nan_to_num(f) for f in at_places(self._phases, *point))
-            h, fastest = np.diff(t), np.abs(rates).max(axis=1)
-            turned = np.maximum(np.abs(np.diff(values, axis=0)).max(axis=1), h * np.maximum(fastest[1:], fastest[:-1]))
-            moved = np.ceil(turned / SHARE)
-            parts = np.maximum(parts, moved[:last].astype(int))
+            values, rates = at_places(self._phases, *point)
+            parts = np.maximum(parts, np.ceil(moved(np.diff(t), values, rates)[:last]).astype(int))
             if np.any(parts > 1):  # those behind are likely to need it, too
                 h = np.diff(trail.t[places[last] : places[last] + AHEAD + 1])
-                ahead = np.ceil(h * fastest[last] / SHARE).astype(int)
+                still = np.repeat(values[[last]], h.size + 1, axis=0), np.repeat(rates[[last]], h.size + 1, axis=0)
+                ahead = np.ceil(moved(h, *still)).astype(int)
         if not np.any(parts > 1):
             return False
         return self._divide(int(places[0]), np.concatenate([parts, ahead]), 0.0)
@@ -85,7 +65,7 @@ class Looks:
         for k in reversed(range(parts.size)):
             begin, end = trail.t[first + k : first + k + 2]
             count = min(int(parts[k]), MOST_PARTS)
-            if count > 1 and (end - begin) / count > max(least, ROUNDING * np.spacing(abs(end))):
+            if count > 1 and (end - begin) / count > max(least, LEAST_INTERVAL * np.spacing(abs(end))):
                 trail.insert(first + k, np.linspace(begin, end, count + 1)[1:-1])
         return trail.last > before
 
