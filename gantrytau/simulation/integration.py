@@ -243,19 +243,24 @@ class Run:
                 switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes
             )
 
-        there = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
-        gaps = look(there)
-        if np.any(gaps.values < -gaps.noise):
-            there = located(low, there, found.guess, self.integrators.step, look)
+        far = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
+        below = np.array([True])
+        if not found.certain:
+            gaps = look(far)
+            below = gaps.values < -gaps.noise
+        there = located(low, far, found.guess, self.integrators.step, look) if np.any(below) else far
         if there is None:
-            turned = self.changes.conditions(switches.of_gaps(np.any(gaps.values < -gaps.noise, axis=0)))
-            raise RuntimeError(f"no step leads to where {' and '.join(turned)} turns")
+            raise RuntimeError(f"no step leads to where {self._below(look(far))} turns")
         if there[2] < trail.t[k + 1]:
             trail.insert(k, np.array([there[2]]))
         trail.x[k + 1], trail.z[k + 1] = there[:2]
         self.done = k + 1
-        gaps = look(there)
-        return bool(np.any(gaps.values < -gaps.noise))
+        return bool(np.any(below))
+
+    def _below(self, gaps: Margins) -> str:
+        """The conditions of gaps that are below zero, in the model's words."""
+        chosen = self.coordinates.switches.of_gaps(np.any(gaps.values < -gaps.noise, axis=0))
+        return " and ".join(self.changes.conditions(chosen))
 
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places; `done` is then the last before it."""

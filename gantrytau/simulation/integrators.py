@@ -108,6 +108,8 @@ class Integrators:
 def _later(coordinates: Coordinates, w: np.ndarray, step: float) -> np.ndarray:
     """What is sampled, held and delayed, (k,), a step later, in s."""
     half, own = len(coordinates.sampled), coordinates.delay_columns
+    if not half and own.stop == own.start:
+        return w.copy()
     there = np.concatenate([w[:half] + step * w[half : 2 * half], w[half:]])
     past = slice(2 * half + own.start, 2 * half + own.stop)
     there[past] = shifted(w[past].reshape(-1, ORDER + 1), step).ravel()

@@ -84,7 +84,7 @@ class Trail:
 
     def inputs(self, k: int) -> np.ndarray:
         """Values and slopes of the sampled inputs on the interval behind a place, and what is held there."""
-        return self.rows(np.array([k]))[0]
+        return self.rows(np.array([k]))[0] if self.courses else self.held[k].copy()
 
     def rows(self, places: np.ndarray) -> np.ndarray:
         """The inputs at places, a row each."""

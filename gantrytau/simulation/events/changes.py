@@ -36,7 +36,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self._turned: dict[int, tuple[float, float, int]] = {}  # switch: last time, rate behind it, hops
+        self._turned: dict[int, tuple[float, int]] = {}  # switch: last time, hops
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -143,6 +143,8 @@ class Changes:
 
     def _refuse_outside(self, k: int, modes: np.ndarray) -> None:
         """SolveError if a table that is not defined beyond its ends is left at a place that gets these modes."""
+        if not self.coordinates.dae.flat.ranges:
+            return
         x, z, t, w = self.point(k)
         w = np.concatenate([w[: w.size - modes.size], modes])
         for number in np.flatnonzero(np.array(self.coordinates.rounds.left(x, z, t, t, w)).ravel()):
@@ -322,14 +324,14 @@ class Changes:
 
     def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
         """SolveError if what states made switch turns again and again, and does not leave zero in between."""
-        t, after = float(self.trail.t[k]), self.margins(np.array([k]))
+        t = float(self.trail.t[k])
         whole = self.coordinates.switches.whole(before.values)
         turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
         for i in turned.tolist():
-            last, rate, hops = self._turned.get(i, (-np.inf, 0.0, 0))
-            away = max(abs(rate), abs(before.rates[0, i])) * (t - last) / 4
+            last, hops = self._turned.get(i, (-np.inf, 0))
+            away = abs(before.rates[0, i]) * (t - last) / 4  # of a parabola: the farthest
             hops = hops + 1 if away < HOP * before.noise[0, i] else 0
-            self._turned[i] = t, float(after.rates[0, i]), hops
+            self._turned[i] = t, hops
             if hops >= CHATTERS:
                 raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
 

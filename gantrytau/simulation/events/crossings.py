@@ -11,6 +11,7 @@ from gantrytau.simulation.singular_poses import Point
 
 DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at
 MOST = 100  # steps to one crossing
+HALVINGS = 50  # of a share of an interval: to rounding
 JUST_BEHIND = 16  # times rounding: near enough behind the crossing
 
 
@@ -41,7 +42,7 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
     if not rows.size:
         return None
     k = int(rows[0])
-    found = [_zero(g0[k, i], b[k, i], c[k, i], d[k, i]) for i in np.flatnonzero(below[k])]
+    found = [_zero(*(float(part[k, i]) for part in (g0, b, c, d))) for i in np.flatnonzero(below[k])]
     if found:
         return Crossing(k, float(t[k] + min(found) * h[k, 0]), True)
     return Crossing(k, float(t[k] + np.min(s[k, dips[k]]) * h[k, 0]), False)
@@ -49,10 +50,15 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
 
 def _zero(a: float, b: float, c: float, d: float) -> float:
     """The first zero of a falling cubic between 0, where it is not below zero but for rounding, and 1, where it is."""
-    roots = np.roots([d, c, b, a]).tolist() if np.all(np.isfinite([a, b, c, d])) else []
-    real = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
-    inside = [s for s in real if b + s * (2 * c + s * 3 * d) <= 0]
-    return min(inside, default=0.5)
+    low, high = 0.0, 1.0
+    root = c * c - 3 * b * d
+    if root > 0 and c + np.sqrt(root) != 0:  # the minimum
+        lowest = -b / (c + np.sqrt(root))
+        high = lowest if 0 < lowest < 1 and a + lowest * (b + lowest * (c + lowest * d)) < 0 else high
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if a + middle * (b + middle * (c + middle * d)) < 0 else (middle, high)
+    return high
 
 
 def located(

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.language.symbols import time
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.crossings import Crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.phases import moved, phases
@@ -48,8 +48,7 @@ class Looks:
         parts = np.where(unforeseen(t[: last + 1], _first(gaps, last + 1)), FINER, 1)
         ahead = np.zeros(0, dtype=int)
         if self._phases is not None:
-            point = trail.x[places], trail.z[places], t[:, None], t[:, None], trail.rows(places)
-            values, rates = at_places(self._phases, *point)
+            values, rates = self._phases(trail.x[places], trail.z[places], t, t, trail.rows(places))
             parts = np.maximum(parts, np.ceil(moved(np.diff(t), values, rates)[:last]).astype(int))
             if np.any(parts > 1):  # those behind are likely to need it, too
                 h = np.diff(trail.t[places[last] : places[last] + AHEAD + 1])
@@ -70,7 +69,7 @@ class Looks:
         return trail.last > before
 
 
-def _phases_of(coordinates: Coordinates) -> ca.Function | None:
+def _phases_of(coordinates: Coordinates) -> AtPlaces | None:
     """(x, z, t, t0, w) -> arguments of periodic functions in what switches by states, and their rates; None without any."""
     c = coordinates
     by_states = [i for i, timed in enumerate(c.switches.timed) if not timed]
@@ -81,7 +80,7 @@ def _phases_of(coordinates: Coordinates) -> ca.Function | None:
         return None
     along = ca.jtimes(found, ca.vertcat(c.x, time), ca.vertcat(c.ode, 1))
     arguments = [c.x, c.z, time, c.t0, c.w]
-    return ca.Function("phases", arguments, [ca.densify(found), ca.densify(along)], {"cse": True})
+    return AtPlaces(ca.Function("phases", arguments, [ca.densify(found), ca.densify(along)], {"cse": True}))
 
 
 def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:

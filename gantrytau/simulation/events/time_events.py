@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.language.symbols import time
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.phases import moved, phases
 
@@ -31,15 +31,11 @@ class TimeEvents:
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
         self._function = ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)])
         self._alone = [
-            ca.Function("margin", [time, w], [ca.densify(margin), ca.densify(rate)])
+            AtPlaces(ca.Function("margin", [time, w], [ca.densify(margin), ca.densify(rate)]))
             for margin, rate in zip(margins.elements(), rates.elements(), strict=True)
         ]
         self._of = [np.flatnonzero(ca.which_depends(m, w)) for m in margins.elements()]
-        own = [phases(margin, time) for margin in margins.elements()]
-        self._phases = [
-            ca.Function("phases", [time, w], [ca.densify(e), ca.densify(ca.jacobian(e, time))]) if e.numel() else None
-            for e in own
-        ]
+        self._phases = [_phases_of(margin, w) for margin in margins.elements()]
         self._windows: dict[tuple[int, bytes], _Window] = {}
 
     def next(self, t: float, w: np.ndarray) -> float | None:
@@ -75,13 +71,13 @@ class TimeEvents:
     def _search(self, i: int, w: np.ndarray, begin: float, looks: int) -> "_Window":
         """The zeros of a margin in some time from `begin` on, with about so many looks at it."""
 
-        def at(times: np.ndarray, function: ca.Function = self._alone[i]) -> list[np.ndarray]:
-            inputs = np.broadcast_to(w, (times.size, w.size))
-            return at_places(function, times[:, None], inputs)
+        def at(times: np.ndarray) -> list[np.ndarray]:
+            return self._alone[i](times, w[None])
 
         t = np.linspace(begin, min(begin + looks * (self.end - self.begin) / DENSE, self.end), looks + 1)
-        if self._phases[i] is not None:
-            t = _closer(t, lambda times: at(times, self._phases[i]), looks)
+        phases = self._phases[i]
+        if phases is not None:
+            t = _closer(t, lambda times: phases(times, w[None]), looks)
         values, rates = (f[:, 0] for f in at(t))
         round_ = (values[:-1] * rates[:-1] < 0) & (values[1:] * rates[1:] > 0)
         inside = [np.linspace(t[k], t[k + 1], WITHIN + 1)[1:-1] for k in np.flatnonzero(round_)]
@@ -120,3 +116,10 @@ def _closer(t: np.ndarray, phases: Callable[[np.ndarray], list[np.ndarray]], mos
             continue
         t = np.interp(np.arange(ahead[count - 1] + 1), np.append(0, ahead[:count]), t[: count + 1])
     return t
+
+
+def _phases_of(margin: ca.SX, w: ca.SX) -> AtPlaces | None:
+    """(time, w) -> phases of a margin and their rates; None without any."""
+    found = phases(margin, time)
+    rates = ca.densify(ca.jacobian(found, time))
+    return AtPlaces(ca.Function("phases", [time, w], [ca.densify(found), rates])) if found.numel() else None
