@@ -329,8 +329,9 @@ class Changes:
         turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
         for i in turned.tolist():
             last, hops = self._turned.get(i, (-np.inf, 0))
-            away = abs(before.rates[0, i]) * (t - last) / 4  # of a parabola: the farthest
-            hops = hops + 1 if away < HOP * before.noise[0, i] else 0
+            # of a parabola: the farthest
+            near = abs(before.rates[0, i]) / 4 < HOP * before.noise[0, i] / (t - last) if t > last else True
+            hops = hops + 1 if near else 0
             self._turned[i] = t, hops
             if hops >= CHATTERS:
                 raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
