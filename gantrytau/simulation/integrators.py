@@ -54,6 +54,11 @@ class Integrators:
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
+    @property
+    def steps(self) -> int:
+        """How many steps the last call took."""
+        return int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
+
     def interrupt(self) -> None:
         """Act upon Ctrl-C: an integrator at work fails at once, as it would go on after a single interruption."""
         self.pressed = True
@@ -103,7 +108,7 @@ class Integrators:
         given = start, z[None], np.reshape(p, (1, -1)), np.reshape(u, (1, -1), order="F")
         with contextlib.redirect_stderr(io.StringIO()), self._at_work():
             far, forces, *_ = integrator(*given, *(0.0 for _ in range(integrator.function.n_in() - len(given))))
-        self.steps = int(integrator.function.stats(1)["nsteps"])  # of its own memory
+        self._last = integrator.function
         reached = far.reshape(count, -1) * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")
