@@ -67,6 +67,15 @@ class Run:
         kept = np.flatnonzero(trail.kept[: self.done + 1])
         return trail.t[kept], trail.x[kept], trail.z[kept], trail.rows(kept)
 
+    def instants(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times at which something was sampled or shown so far, and what is held from there on; None if all are shown."""
+        trail, so_far = self.trail, slice(self.done + 1)
+        due = trail.due[so_far].any(axis=1)
+        if not np.any(due & ~trail.kept[so_far]):
+            return None
+        places = np.flatnonzero(due | trail.kept[so_far])
+        return trail.t[places], trail.rows(places)
+
     @property
     def ended(self) -> str:
         """Why it ended: "stop", or what a when said."""

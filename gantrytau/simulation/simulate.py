@@ -106,7 +106,7 @@ def _all_runs(
     while True:
         run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
         ended = run.ended if error is None else str(error) or "interrupted"
-        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))
+        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended, run.instants()))
         found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
         if found is None:
             break
