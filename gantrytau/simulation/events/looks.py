@@ -45,7 +45,8 @@ class Looks:
         trail = self.trail
         last = places.size - 1 if found is None else found.place + 1
         t = trail.t[places]
-        parts = np.where(unforeseen(t[: last + 1], _first(gaps, last + 1)), FINER, 1)
+        with np.errstate(invalid="ignore", over="ignore"):  # behind a crossing the motion is none
+            parts = np.where(unforeseen(t[: last + 2], gaps.until(last + 2))[:last], FINER, 1)
         ahead = np.zeros(0, dtype=int)
         if self._phases is not None:
             values, rates = self._phases(trail.x[places], trail.z[places], t, t, trail.rows(places))
@@ -99,7 +100,3 @@ def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:
     found[:-1] |= bad
     found[1:] |= bad
     return found
-
-
-def _first(gaps: Margins, count: int) -> Margins:
-    return Margins(gaps.values[:count], gaps.rates[:count], gaps.noise[:count])

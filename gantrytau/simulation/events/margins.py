@@ -28,6 +28,10 @@ class Margins:
         """The same, known no better than by some errors."""
         return Margins(self.values, self.rates, np.maximum(self.noise, errors))
 
+    def until(self, count: int) -> "Margins":
+        """The same at the first places."""
+        return Margins(self.values[:count], self.rates[:count], self.noise[:count])
+
 
 class Switches:
     """What turns where its margin passes zero (or a whole number, if it counts).
