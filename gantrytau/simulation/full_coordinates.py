@@ -364,7 +364,9 @@ class Coordinates:
     def _made_algebra(self) -> AtPlaces:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
         arguments = [self.x, self.z, time, self.t0, self.w]
-        return AtPlaces(ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True}))
+        return AtPlaces(
+            ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+        )
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.

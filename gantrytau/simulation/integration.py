@@ -239,7 +239,11 @@ class Run:
     def _gaps(self, places: np.ndarray) -> Margins | None:
         """How far from its next turn each switch is at successive places."""
         switches = self.coordinates.switches
-        return switches.gaps(self.changes.margins(places), self.changes.modes(places[0])) if len(switches) else None
+        return (
+            switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
+            if len(switches)
+            else None
+        )
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""

@@ -107,7 +107,9 @@ class Integrators:
         start = (x / self.sizes)[None] if x.size else np.zeros((1, 1))
         given = start, z[None], np.reshape(p, (1, -1)), np.reshape(u, (1, -1), order="F")
         with contextlib.redirect_stderr(io.StringIO()), self._at_work():
-            far, forces, *_ = integrator(*given, *(0.0 for _ in range(integrator.function.n_in() - len(given))))
+            far, forces, *_ = integrator(
+                *given, *(0.0 for _ in range(integrator.function.n_in() - len(given)))
+            )
         self._last = integrator.function
         reached = far.reshape(count, -1) * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):

@@ -17,8 +17,9 @@ def wrong_ends(motion: SwitchingMotion, text: str, tolerance: float = 1e-8) -> l
     for points in (2, 11, 501):
         inputs = {"f": pulse_of_time(motion.pulse)}
         end = simulate(dae, stop=END, points=points, inputs=inputs, tolerance=tolerance).final("x")
-        if not np.abs(end - motion.end).max() <= CLOSE * (1 + np.abs(motion.end).max()):
-            found.append(f"{text}, {motion.text}, {points} points: {end}, expected {motion.end}")
+        wanted = np.asarray(motion.end)
+        if not np.abs(end - wanted).max() <= CLOSE * (1 + np.abs(wanted).max()):
+            found.append(f"{text}, {motion.text}, {points} points: {end}, expected {wanted}")
     return found
 
 

@@ -146,7 +146,9 @@ def test_guards_of_transitions_are_found():
 
         def equations(self) -> Any:
             yield der(self.x) == 1
-            yield transition(self.mode, "closed", "opened", sin(300 * self.x) > 0.5, self.n == pre(self.n) + 1)
+            yield transition(
+                self.mode, "closed", "opened", sin(300 * self.x) > 0.5, self.n == pre(self.n) + 1
+            )
             yield transition(self.mode, "opened", "closed", sin(300 * self.x) < -0.5)
 
     turns = 300 * 10 / (2 * math.pi) - 1 / 12

@@ -43,7 +43,9 @@ class AtPlaces:
                     one[k] = own
         return found
 
-    def _together(self, places: int, arguments: tuple[np.ndarray | float, ...], found: list[np.ndarray]) -> None:
+    def _together(
+        self, places: int, arguments: tuple[np.ndarray | float, ...], found: list[np.ndarray]
+    ) -> None:
         memory, go = self.function.map(places).buffer()
         given = []
         for own, array in zip(self._given, arguments, strict=True):

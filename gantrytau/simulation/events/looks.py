@@ -53,7 +53,10 @@ class Looks:
             parts = np.maximum(parts, np.ceil(moved(np.diff(t), values, rates)[:last]).astype(int))
             if np.any(parts > 1):  # those behind are likely to need it, too
                 h = np.diff(trail.t[places[last] : places[last] + AHEAD + 1])
-                still = np.repeat(values[[last]], h.size + 1, axis=0), np.repeat(rates[[last]], h.size + 1, axis=0)
+                still = (
+                    np.repeat(values[[last]], h.size + 1, axis=0),
+                    np.repeat(rates[[last]], h.size + 1, axis=0),
+                )
                 ahead = np.ceil(moved(h, *still)).astype(int)
         if not np.any(parts > 1):
             return False
@@ -95,7 +98,9 @@ def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:
     c, d = 3 * rise - 2 * b - e, b + e - 2 * rise
     missed = np.abs(g[:-2] + s * (b + s * (c + s * d)) - g[1:-1])
     bent = np.abs(b + s * (2 * c + s * 3 * d) - h * rates[1:-1]) / 4
-    size = np.maximum(np.maximum(np.abs(g[:-2]), np.abs(g[2:])), np.abs(g[1:-1])) + RESOLVED * gaps.noise[1:-1]
+    size = (
+        np.maximum(np.maximum(np.abs(g[:-2]), np.abs(g[2:])), np.abs(g[1:-1])) + RESOLVED * gaps.noise[1:-1]
+    )
     bad = np.any(np.maximum(missed, bent) > size, axis=1)
     found[:-1] |= bad
     found[1:] |= bad

@@ -90,7 +90,9 @@ class Switches:
 
     def jumped(self, before: Point, after: Point) -> bool:
         """Whether rates or algebraics differ at two places of one instant; at a kink they do not."""
-        moves = [np.append(self._moves(x[None], z[None], t, t, w[None])[0], z) for x, z, t, w in (before, after)]
+        moves = [
+            np.append(self._moves(x[None], z[None], t, t, w[None])[0], z) for x, z, t, w in (before, after)
+        ]
         size = np.abs(moves).max(initial=0.0)
         return bool(np.any(np.abs(moves[1] - moves[0]) > JUMP * size))
 
