@@ -16,6 +16,7 @@ from gantrytau import (
     cos,
     der,
     fabs,
+    floor,
     if_else,
     mod,
     pre,
@@ -26,6 +27,7 @@ from gantrytau import (
     time,
     when,
 )
+from gantrytau.simulation.events.changes import accumulate
 from gantrytau.simulation.events.crossings import located
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.poles import without_poles
@@ -141,6 +143,29 @@ class Accumulating(Model):
 def test_what_turns_without_leaving_its_switch_is_told(model, stop):
     with pytest.raises(SolveError, match=r"the condition on .*x turns back and forth without end"):
         simulate(model(), stop=stop)
+
+
+def test_turns_that_accumulate_at_a_pole_are_told(monkeypatch):
+    monkeypatch.setattr("gantrytau.simulation.events.changes.MANY", (256,))
+
+    class Counting(Model):
+        x = Real(start=-1.0, fixed=True)
+        n = Discrete(0)
+
+        def equations(self):
+            yield der(self.x) == 1
+            yield when(floor(1 / self.x) > 3, self.n == pre(self.n) + 1)
+
+    with pytest.raises(
+        SolveError, match=r"condition on x turned thousands of times, in intervals that shrink"
+    ) as caught:
+        simulate(Counting(), stop=3.0)
+    assert caught.value.time == pytest.approx(1.0, abs=1e-2)
+
+
+@pytest.mark.parametrize(("power", "told"), [(2.0, True), (1.0, False), (0.5, False), (0.0, False)])
+def test_intervalsaccumulate_where_their_sum_has_a_limit(power, told):
+    assert accumulate(np.cumsum(np.arange(1.0, 2049) ** -power).tolist()) == told
 
 
 CONDITIONS: dict[str, tuple[Any, list[float]]] = {  # of x, and where they become true for x from -1 to 6

@@ -5,7 +5,8 @@ whose conditions became true act, in rounds: Discretes and states get new values
 consistent, the switches get their sides anew, until no condition becomes true any more.
 """
 
-from itertools import product
+from collections.abc import Sequence
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -22,6 +23,11 @@ from gantrytau.simulation.trail import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
 CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
+MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
+HALVES = 5
+SHRINKING = (
+    0.42  # of an interval between two turns to that after half as many: less than 1 / 2, which is 1 / k
+)
 HOP = (
     1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
 )
@@ -36,7 +42,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self._turned: dict[int, tuple[float, int]] = {}  # switch: last time, hops
+        self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -323,18 +329,28 @@ class Changes:
         return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 
     def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
-        """SolveError if what states made switch turns again and again, and does not leave zero in between."""
+        """SolveError if what states made switch turns again and again, and does not leave zero in between or accumulates."""
         t = float(self.trail.t[k])
         whole = self.coordinates.switches.whole(before.values)
         turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
         for i in turned.tolist():
-            last, hops = self._turned.get(i, (-np.inf, 0))
+            hops, times = self._turned.setdefault(i, (0, []))
+            last = times[-1] if times else -np.inf
             # of a parabola: the farthest
             near = abs(before.rates[0, i]) / 4 < HOP * before.noise[0, i] / (t - last) if t > last else True
             hops = hops + 1 if near else 0
-            self._turned[i] = t, hops
+            times.append(t)
+            self._turned[i] = hops, times
             if hops >= CHATTERS:
                 raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
+            if len(times) in MANY and accumulate(times):
+                raise run_ends.never_past(self.coordinates.dae, t, self.conditions(turned))
+
+
+def accumulate(times: Sequence[float]) -> bool:
+    """Whether intervals shrink faster than 1 / k, at k and at each half of it, so that their sum has a limit."""
+    last = [times[(len(times) >> n) - 1] - times[(len(times) >> n) - 2] for n in range(HALVES + 1)]
+    return all(later < SHRINKING * earlier for later, earlier in pairwise(last))
 
 
 def _at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:
