@@ -238,12 +238,9 @@ class Run:
 
     def _gaps(self, places: np.ndarray) -> Margins | None:
         """How far from its next turn each switch is at successive places."""
-        switches = self.coordinates.switches
-        return (
-            switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
-            if len(switches)
-            else None
-        )
+        if not len(self.coordinates.switches):
+            return None
+        return self.coordinates.switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
@@ -257,23 +254,16 @@ class Run:
             )
 
         far = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
-        below = np.array([True])
-        if not found.certain:
-            gaps = look(far)
-            below = gaps.values < -gaps.noise
-        there = located(low, far, found.guess, self.integrators.step, look) if np.any(below) else far
+        turned = found.certain or look(far).below.any()
+        there = located(low, far, found.guess, self.integrators.step, look) if turned else far
         if there is None:
-            raise RuntimeError(f"no step leads to where {self._below(look(far))} turns")
+            conditions = self.changes.conditions(switches.of_gaps(look(far).below[0]))
+            raise RuntimeError(f"no step leads to where {' and '.join(conditions)} turns")
         if there[2] < trail.t[k + 1]:
             trail.insert(k, np.array([there[2]]))
         trail.x[k + 1], trail.z[k + 1] = there[:2]
         self.done = k + 1
-        return bool(np.any(below))
-
-    def _below(self, gaps: Margins) -> str:
-        """The conditions of gaps that are below zero, in the model's words."""
-        chosen = self.coordinates.switches.of_gaps(np.any(gaps.values < -gaps.noise, axis=0))
-        return " and ".join(self.changes.conditions(chosen))
+        return bool(turned)
 
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places; `done` is then the last before it."""

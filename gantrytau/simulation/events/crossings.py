@@ -28,7 +28,7 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
     """The first step between places t (n,) in s in which a gap falls below zero, or may dip below it."""
     h = np.diff(t)[:, None]
     g0, g1 = gaps.values[:-1], gaps.values[1:]
-    below = g1 < -gaps.noise[1:]
+    below = gaps.below[1:]
     # the cubic through values and rates at both ends: g0 + b s + c s^2 + d s^3
     b, e = h * gaps.rates[:-1], h * gaps.rates[1:]
     c, d = 3 * (g1 - g0) - 2 * b - e, 2 * (g0 - g1) + b + e

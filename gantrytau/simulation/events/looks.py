@@ -11,7 +11,7 @@ from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.crossings import Crossing
 from gantrytau.simulation.events.margins import Margins
-from gantrytau.simulation.events.phases import moved, phases
+from gantrytau.simulation.events.phases import SHARE, moved, phases
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.trail import Trail
 
@@ -53,11 +53,7 @@ class Looks:
             parts = np.maximum(parts, np.ceil(moved(np.diff(t), values, rates)[:last]).astype(int))
             if np.any(parts > 1):  # those behind are likely to need it, too
                 h = np.diff(trail.t[places[last] : places[last] + AHEAD + 1])
-                still = (
-                    np.repeat(values[[last]], h.size + 1, axis=0),
-                    np.repeat(rates[[last]], h.size + 1, axis=0),
-                )
-                ahead = np.ceil(moved(h, *still)).astype(int)
+                ahead = np.ceil(h * np.abs(np.nan_to_num(rates[last])).max() / SHARE).astype(int)
         if not np.any(parts > 1):
             return False
         return self._divide(int(places[0]), np.concatenate([parts, ahead]), 0.0)
@@ -90,17 +86,13 @@ def _phases_of(coordinates: Coordinates) -> AtPlaces | None:
 def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:
     """Intervals between times t (n,) in s, (n - 1,), across which gaps do not go as those beside them lead to expect."""
     found = np.zeros(t.size - 1, dtype=bool)
-    if t.size < 3:
-        return found
     h, g, rates = (t[2:] - t[:-2])[:, None], gaps.values, gaps.rates
     s = np.diff(t)[:-1, None] / h
     b, e, rise = h * rates[:-2], h * rates[2:], g[2:] - g[:-2]
     c, d = 3 * rise - 2 * b - e, b + e - 2 * rise
     missed = np.abs(g[:-2] + s * (b + s * (c + s * d)) - g[1:-1])
     bent = np.abs(b + s * (2 * c + s * 3 * d) - h * rates[1:-1]) / 4
-    size = (
-        np.maximum(np.maximum(np.abs(g[:-2]), np.abs(g[2:])), np.abs(g[1:-1])) + RESOLVED * gaps.noise[1:-1]
-    )
+    size = np.abs([g[:-2], g[1:-1], g[2:]]).max(axis=0) + RESOLVED * gaps.noise[1:-1]
     bad = np.any(np.maximum(missed, bent) > size, axis=1)
     found[:-1] |= bad
     found[1:] |= bad

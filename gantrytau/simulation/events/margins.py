@@ -28,6 +28,11 @@ class Margins:
         """The same, known no better than by some errors."""
         return Margins(self.values, self.rates, np.maximum(self.noise, errors))
 
+    @property
+    def below(self) -> np.ndarray:
+        """Which are below zero."""
+        return self.values < -self.noise
+
     def until(self, count: int) -> "Margins":
         """The same at the first places."""
         return Margins(self.values[:count], self.rates[:count], self.noise[:count])
