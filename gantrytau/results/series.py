@@ -26,6 +26,7 @@ class Series:
     title: what was computed, for figures and files.
     aliases: further name -> the name in `values` that it equals; a minus sign before it says the negative.
     held: names of scalars that hold their values from one time to the next, as what is sampled does.
+    instants: some of these at more times, at all at which they change, for `at`.
     ended: why it ends where it does, "stop" where that was asked for.
     modes: names of the values 0, 1, ... of a scalar, by its name.
     shapes: what the components of the model look like, by names.
@@ -45,6 +46,7 @@ class Series:
         title: str = "",
         aliases: Mapping[str, str] | None = None,
         held: Iterable[str] = (),
+        instants: "Series | None" = None,
         ended: str = "stop",
         modes: Mapping[str, Sequence[str]] | None = None,
         shapes: Iterable[Shape] = (),
@@ -64,6 +66,7 @@ class Series:
         self._title = title
         self._aliases = dict(aliases or {})
         self._held = frozenset(held)
+        self._instants = instants
         self._ended = ended
         self._modes = {name: tuple(words) for name, words in (modes or {}).items()}
         self._shapes = tuple(shapes)
@@ -187,6 +190,8 @@ class Series:
         if name in self._arrays:
             columns = [np.asarray(self.at(times, str(element))) for element in self._arrays[name].flat]
             return np.stack(columns, axis=-1).reshape(*times.shape, *self._arrays[name].shape)
+        if self._instants is not None and name in self._instants:
+            return self._instants.at(t, name)
         values = self[name]
         left = np.searchsorted(self._time, times, side="right") - 1
         right = np.minimum(left + 1, self._time.size - 1)
@@ -214,6 +219,8 @@ class Series:
         units = {name: self.unit(name) for name in values}
         words = {name: self.description(name) for name in values}
         own: dict[str, Any] = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)
+        some = [] if self._instants is None else [name for name in values if name in self._instants]
+        own["instants"] = self._instants.select(some) if self._instants is not None and some else None
         own["modes"] = {name: words for name, words in self._modes.items() if name in values}
         own |= dict(shapes=self._shapes, displays={name: self.display(name) for name in values})
         return type(self)(self._time, values, units=units, descriptions=words, **own)

@@ -14,7 +14,7 @@ from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
@@ -259,10 +259,10 @@ class Coordinates:
         )
 
     @property
-    def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
+    def _levels(self) -> list[tuple[list[int], AtPlaces, tuple[str, ...]]]:
         return self.kept("levels", self._made_levels)
 
-    def _made_levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
+    def _made_levels(self) -> list[tuple[list[int], AtPlaces, tuple[str, ...]]]:
         """Each level: its columns, the function to its residual and Jacobian, the names of its rows."""
         found = []
         positions = {n: k for k, n in enumerate(self.states)}
@@ -277,7 +277,7 @@ class Coordinates:
             jacobian = ca.densify(ca.jacobian(residual, x))
             arguments = [self.x, time, self.t0, self.w]
             function = ca.Function("level", arguments, [ca.densify(residual), jacobian], {"cse": True})
-            found.append((columns, function, self.rows[stage]))
+            found.append((columns, AtPlaces(function), self.rows[stage]))
         return found
 
     def project(self, x: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -291,7 +291,7 @@ class Coordinates:
         for columns, level, _ in self._levels:
             worst = np.zeros(len(x))
             for _ in range(STEPS):
-                residual, jacobian = at_places(level, x, t[:, None], t[:, None], w)
+                residual, jacobian = level(x, t, t, w)
                 jacobian = jacobian.reshape(len(x), len(columns), -1).transpose(0, 2, 1)
                 size = size or min(1.0, float(np.abs(x[:, columns]).max(initial=0.0))) or 1.0
                 terms = np.maximum(np.abs(x[:, columns]), size * least[columns])
@@ -316,7 +316,7 @@ class Coordinates:
         for columns, level, names in self._levels:
             free = [k for k, c in enumerate(columns) if self.states[c] not in own]
             for _ in range(STEPS):
-                residual, jacobian = (np.array(m) for m in level(x, t, t, w))
+                residual, jacobian = (np.array(m) for m in level.function(x, t, t, w))
                 scale = np.abs(jacobian) @ np.maximum(np.abs(x[columns]), LEAST)
                 if np.all(np.abs(residual.ravel()) <= LARGEST_DRIFT * scale):
                     break
@@ -340,7 +340,7 @@ class Coordinates:
         """The algebraic variables that belong to points, (points, m): the integrator does not see to their errors."""
         before: Any = np.inf
         for _ in range(STEPS if self.algebraics else 0):
-            residual, jacobian = at_places(self._algebra, x, z, t[:, None], t[:, None], w)
+            residual, jacobian = self._algebra(x, z, t, t, w)
             jacobian = jacobian.reshape(len(x), z.shape[1], -1).transpose(0, 2, 1)
             try:
                 step = np.linalg.solve(jacobian, residual[:, :, None])[:, :, 0]
@@ -358,13 +358,15 @@ class Coordinates:
         return z
 
     @property
-    def _algebra(self) -> ca.Function:
+    def _algebra(self) -> AtPlaces:
         return self.kept("algebra", self._made_algebra)
 
-    def _made_algebra(self) -> ca.Function:
+    def _made_algebra(self) -> AtPlaces:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
         arguments = [self.x, self.z, time, self.t0, self.w]
-        return ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+        return AtPlaces(
+            ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+        )
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -372,7 +374,7 @@ class Coordinates:
         The constraints are asked first: where they are sound, all equations of the accelerations are.
         """
         for _, level, names in self._levels:
-            here, before = (np.array(level(x, t, t, w)[1]) for x, _, t, w in (point, start))
+            here, before = (np.array(level.function(x, t, t, w)[1]) for x, _, t, w in (point, start))
             found = depending(here, before, names)
             if found:
                 return found

@@ -8,8 +8,9 @@ from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
-from gantrytau.simulation.events.changes import SHORT, Changes
+from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
+from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -24,13 +25,9 @@ CHUNK = 10  # output intervals between two projections onto the constraints, or 
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
 REST = 10.0  # times the tolerance: what may be left of a margin
 GROWTH = 10  # of a stretch in which nothing has switched
-STEPS_BETWEEN = (
-    8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
-)
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
-REFINED = 50  # intervals ahead that are divided as well
 
 
 class Run:
@@ -59,6 +56,7 @@ class Run:
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
+        self.looks = Looks(coordinates, self.trail)
         sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
         self.history = PastValues(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
         self.sampler = sampler if sampler.suits else None
@@ -66,8 +64,17 @@ class Run:
     def so_far(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Times, states, algebraics, and what is sampled and held, at the output points that were reached."""
         trail = self.trail
-        kept = trail.kept[trail.kept <= self.done]
+        kept = np.flatnonzero(trail.kept[: self.done + 1])
         return trail.t[kept], trail.x[kept], trail.z[kept], trail.rows(kept)
+
+    def instants(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Times at which something was sampled or shown so far, and what is held from there on; None if all are shown."""
+        trail, so_far = self.trail, slice(self.done + 1)
+        due = trail.due[so_far].any(axis=1)
+        if not np.any(due & ~trail.kept[so_far]):
+            return None
+        places = np.flatnonzero(due | trail.kept[so_far])
+        return trail.t[places], trail.rows(places)
 
     @property
     def ended(self) -> str:
@@ -172,9 +179,10 @@ class Run:
             return False
         close = closing & (left <= REST * self.integrators.tolerance * scale)
         if not close.any():
-            if h > SHORT**2 * self.span:
+            wide = h > LEAST_INTERVAL * np.spacing(abs(trail.t[k + 1]))
+            if wide:
                 trail.insert(k, np.array([trail.t[k] + h / 2]))
-            return bool(h > SHORT**2 * self.span)
+            return bool(wide)
         for gap in np.flatnonzero(close):
             trail.x[k] = switches.behind(
                 int(gap), self.changes.point(k), self.changes.modes(k), self.changes.sizes
@@ -194,7 +202,9 @@ class Run:
         courses = self._courses(here, count) if self.coordinates.stepwise else None
         self.integrators.shorter = self._shorter()
         x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
-        if self._too_wide(count):
+        steps = self.integrators.steps - STARTING * (count if self.history else 1)
+        least = self.integrators.shorter or 0.0  # steps kept short say nothing
+        if self.looks.by_steps(here, count, steps, least):
             return False
         reached = ahead[1:]
         inputs = trail.rows(reached)
@@ -205,25 +215,14 @@ class Run:
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         if self.history and self.history.too_wide(here, count):
             return False
-        found = self._crossing(ahead)
+        gaps = self._gaps(ahead)
+        found = None if gaps is None else first_crossing(trail.t[ahead], gaps)
+        if gaps is not None and self.looks.by_margins(ahead, gaps, found):
+            return False
         self.done = here + count if found is None else here + found.place
         self._watch(here, self.done)
         self._hold_together(reached)
         return found is not None and self._cross(found)
-
-    def _too_wide(self, count: int) -> bool:
-        """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
-        starts = count if self.history else 1  # of the integrator
-        parts = (self.integrators.steps - STARTING * starts) // (STEPS_BETWEEN * count)
-        if parts < 2 or not len(self.coordinates.switches):
-            return False
-        trail, here, last = self.trail, self.done, self.trail.last
-        least = max(SHORT**2 * self.span, self.integrators.shorter or 0.0)  # steps kept short say nothing
-        for k in reversed(range(here, min(here + max(count, REFINED), last))):
-            times = np.linspace(trail.t[k], trail.t[k + 1], int(parts) + 1)[1:-1]
-            if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > least):
-                trail.insert(k, times)
-        return trail.last > last
 
     def _courses(self, here: int, count: int) -> np.ndarray:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
@@ -237,13 +236,11 @@ class Run:
         inputs = trail.rows(np.arange(here, here + count)).T
         return np.vstack([trail.t[here : here + count], h, np.arange(count), inputs])
 
-    def _crossing(self, places: np.ndarray) -> Crossing | None:
-        """The first interval between successive places in which something switches."""
-        switches = self.coordinates.switches
-        if not len(switches):
+    def _gaps(self, places: np.ndarray) -> Margins | None:
+        """How far from its next turn each switch is at successive places."""
+        if not len(self.coordinates.switches):
             return None
-        gaps = switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
-        return first_crossing(self.trail.t[places], gaps)
+        return self.coordinates.switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
 
     def _cross(self, found: Crossing) -> bool:
         """Lay a place just behind a crossing, or where a margin is lowest; whether something switches there."""
@@ -256,18 +253,17 @@ class Run:
                 switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes
             )
 
-        if found.certain:
-            there = located(low, float(trail.t[k + 1]), found.guess, self.integrators.step, look)
-        else:
-            there = self.integrators.step(low, found.guess - low[2])
-            gaps = look(there)
-            if np.any(gaps.values < -gaps.noise):
-                there = located(low, found.guess, found.guess, self.integrators.step, look)
-        trail.insert(k, np.array([there[2]]))
+        far = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
+        turned = found.certain or look(far).below.any()
+        there = located(low, far, found.guess, self.integrators.step, look) if turned else far
+        if there is None:
+            conditions = self.changes.conditions(switches.of_gaps(look(far).below[0]))
+            raise RuntimeError(f"no step leads to where {' and '.join(conditions)} turns")
+        if there[2] < trail.t[k + 1]:
+            trail.insert(k, np.array([there[2]]))
         trail.x[k + 1], trail.z[k + 1] = there[:2]
         self.done = k + 1
-        gaps = look(there)
-        return bool(np.any(gaps.values < -gaps.noise))
+        return bool(turned)
 
     def _watch(self, first: int, last: int) -> None:
         """SolveError if a singular pose lies between two places; `done` is then the last before it."""

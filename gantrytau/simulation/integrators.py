@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.singular_poses import Point
@@ -54,6 +55,11 @@ class Integrators:
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
+    @property
+    def steps(self) -> int:
+        """How many steps the last call took."""
+        return int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
+
     def interrupt(self) -> None:
         """Act upon Ctrl-C: an integrator at work fails at once, as it would go on after a single interruption."""
         self.pressed = True
@@ -93,22 +99,30 @@ class Integrators:
         size, tolerance = self.size, self.tolerance
         integrator = self.coordinates.kept(
             ("integrator", count, most, modes, longest, size, tolerance, self.coordinates.sizes),
-            lambda: self.coordinates.integrator(
-                count, tolerance, size=size, steps=most, modes=modes, longest=longest
+            lambda: AtPlaces(
+                self.coordinates.integrator(
+                    count, tolerance, size=size, steps=most, modes=modes, longest=longest
+                )
             ),
         )
+        start = (x / self.sizes)[None] if x.size else np.zeros((1, 1))
+        given = start, z[None], np.reshape(p, (1, -1)), np.reshape(u, (1, -1), order="F")
         with contextlib.redirect_stderr(io.StringIO()), self._at_work():
-            found = integrator(x0=x / self.sizes if x.size else 0.0, z0=z, p=p, u=u)
-        self.steps = int(integrator.stats()["nsteps"])
-        reached = np.array(found["xf"]).T * self.sizes if x.size else np.zeros((count, 0))
+            far, forces, *_ = integrator(
+                *given, *(0.0 for _ in range(integrator.function.n_in() - len(given)))
+            )
+        self._last = integrator.function
+        reached = far.reshape(count, -1) * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")
-        return reached, np.array(found["zf"]).T.reshape(count, -1)
+        return reached, forces.reshape(count, -1)
 
 
 def _later(coordinates: Coordinates, w: np.ndarray, step: float) -> np.ndarray:
     """What is sampled, held and delayed, (k,), a step later, in s."""
     half, own = len(coordinates.sampled), coordinates.delay_columns
+    if not half and own.stop == own.start:
+        return w.copy()
     there = np.concatenate([w[:half] + step * w[half : 2 * half], w[half:]])
     past = slice(2 * half + own.start, 2 * half + own.stop)
     there[past] = shifted(w[past].reshape(-1, ORDER + 1), step).ravel()

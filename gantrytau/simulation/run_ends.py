@@ -98,6 +98,17 @@ def chattering(dae: Translated, t: float, conditions: Sequence[str]) -> SolveErr
     )
 
 
+def never_past(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
+    """Conditions turn in intervals that shrink towards an instant, behind time t, which is not reached."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turned thousands of times, in intervals that shrink "
+        "towards an instant which is never reached: look for a pole, as of floor(1 / x), or a frequency that grows beyond "
+        "all limits, and keep away from it; .result holds the motion up to there",
+        time=t,
+        equations=[],
+    )
+
+
 def left_table(dae: Translated, t: float, table: Range) -> SolveError:
     """The argument of a table leaves it at time t."""
     return SolveError(

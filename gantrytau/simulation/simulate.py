@@ -64,7 +64,8 @@ def simulate(
     an FMU keeps the states of its export.
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
-    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
+    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however often
+    it turns: places are laid by the rates of what it depends on.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
@@ -112,7 +113,7 @@ def _all_runs(
     while True:
         run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
         ended = run.ended if error is None else str(error) or "interrupted"
-        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))
+        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended, run.instants()))
         found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
         if found is None:
             break

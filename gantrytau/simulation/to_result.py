@@ -25,9 +25,11 @@ def result_of(
     w: np.ndarray,
     outputs: Sequence[str] | None,
     ended: str = "stop",
+    instants: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Result:
     """Every variable and derivative (or only `outputs`) at the given times; w: what is sampled, held and switched there;
-    ended: why there are no more of them.
+    ended: why there are no more of them; instants: all times at which something is sampled, and w there, where these are
+    more.
     """
     dae = coordinates.dae
     names, steps, function = coordinates.kept(
@@ -41,6 +43,8 @@ def result_of(
     modes = {n: own for n, own in dae.flat.modes.items() if n in table}
     own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes, shapes=dae.flat.shapes)
     own["displays"] = displays(dae)
+    if instants is not None and steps:
+        own["instants"] = _held_at(coordinates, steps, *instants)
     return Result(times, table, units=units, descriptions=words, **own)
 
 
@@ -59,6 +63,14 @@ def _variables(
     steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
     arguments = [time, coordinates.x, coordinates.z, coordinates.w]
     return names, steps, ca.Function("variables", arguments, [found])
+
+
+def _held_at(coordinates: Coordinates, names: Sequence[str], times: np.ndarray, w: np.ndarray) -> Result:
+    """What is held, which follows from w alone, at times."""
+    names, _, function = coordinates.kept(("variables", tuple(names)), lambda: _variables(coordinates, names))
+    nothing = np.zeros((1, len(coordinates.states))), np.zeros((1, len(coordinates.algebraics)))
+    (rows,) = at_places(function, times, *nothing, w)
+    return Result(times, dict(zip(names, rows.T, strict=True)), held=names)
 
 
 def doubts(result: Result) -> str:

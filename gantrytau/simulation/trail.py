@@ -19,7 +19,7 @@ class Trail:
     """Places in order of time: t (n,) in s, which repeats where something jumps, before and behind; x, z: states and
     algebraics, a row each; held: what is held from there on, sampled variables, discretes, then modes; due: which of the
     first are sampled there; driven: inputs that are given by samples, behind their jumps; stops: whether an integration
-    ends there; kept: places that results show.
+    ends there; kept: whether results show a place.
     """
 
     def __init__(
@@ -34,6 +34,7 @@ class Trail:
         parts = max(1, -(-LEAST_STEPS // (grid.size - 1)))
         fine = np.interp(np.arange((grid.size - 1) * parts + 1) / parts, np.arange(grid.size), grid)
         fine[::parts] = grid
+        self._rooms: dict[str, np.ndarray] = {}  # of the rows, with some to spare
         self._past, past = coordinates.delay_columns, len(coordinates.dae.flat.delays) > 0
         watched = coordinates.conditioning.needed or len(coordinates.switches) or len(spans) or past
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
@@ -48,10 +49,11 @@ class Trail:
         self.stops[before] = True
         self.stops[np.searchsorted(self.t, spans[:, 0], side="right") - 1] = True
         self.stops[np.minimum(np.searchsorted(self.t, spans[:, 1]), self.last)] = True
-        self.kept: np.ndarray = np.searchsorted(self.t, grid, side="right") - 1
-        if before.size <= max(grid.size, LEAST_STEPS):
-            self.kept = np.unique(np.concatenate([self.kept, before, before + 1]))
         size = self.t.size
+        self.kept = np.zeros(size, dtype=bool)
+        self.kept[np.searchsorted(self.t, grid, side="right") - 1] = True
+        if before.size <= max(grid.size, LEAST_STEPS):
+            self.kept[before] = self.kept[before + 1] = True
         self.x = np.full((size, len(coordinates.states)), np.nan)
         self.z = np.full((size, len(coordinates.algebraics)), np.nan)
         names = (*coordinates.held, *coordinates.discretes)
@@ -78,12 +80,11 @@ class Trail:
 
     def shown(self, first: int, last: int) -> np.ndarray:
         """The places behind the first that results show, and the last."""
-        own = self.kept[np.searchsorted(self.kept, first, side="right") : np.searchsorted(self.kept, last)]
-        return np.append(np.unique(own), last)
+        return np.append(first + 1 + np.flatnonzero(self.kept[first + 1 : last]), last)
 
     def inputs(self, k: int) -> np.ndarray:
         """Values and slopes of the sampled inputs on the interval behind a place, and what is held there."""
-        return self.rows(np.array([k]))[0]
+        return self.rows(np.array([k]))[0] if self.courses else self.held[k].copy()
 
     def rows(self, places: np.ndarray) -> np.ndarray:
         """The inputs at places, a row each."""
@@ -119,34 +120,43 @@ class Trail:
 
     def insert(self, k: int, times: np.ndarray, *, stop: bool = False) -> None:
         """Add places behind place k; nothing is known of them yet but what is held from k on."""
-        at, before = np.full(len(times), k + 1), self.t[k]
-        self.t = np.insert(self.t, at, times)
-        self.stops = np.insert(self.stops, at, stop)
-        self.due = np.insert(self.due, at, False, axis=0)
-        driven = np.where(self._constant, self.driven[k], self._values(times))
-        self.driven = np.insert(self.driven, at, driven, axis=0)
-        self.x = np.insert(self.x, at, np.nan, axis=0)
-        self.z = np.insert(self.z, at, np.nan, axis=0)
-        held = np.repeat(self.held[k][None], len(times), axis=0)
-        past = held[:, self._past].reshape(len(times), -1, ORDER + 1)
-        held[:, self._past] = shifted(past, (times - before)[:, None]).reshape(len(times), -1)
-        self.held = np.insert(self.held, at, held, axis=0)
-        self.kept[self.kept > k] += len(times)
+        new, before = slice(k + 1, k + 1 + len(times)), self.t[k]
+        self._make_room(k + 1, len(times))
+        self.t[new], self.stops[new], self.due[new], self.kept[new] = times, stop, False, False
+        if self.courses:
+            self.driven[new] = np.where(self._constant, self.driven[k], self._values(times))
+        self.held[new] = self.held[k]
+        if self._past.stop > self._past.start:
+            past = self.held[new, self._past].reshape(len(times), -1, ORDER + 1)
+            self.held[new, self._past] = shifted(past, (times - before)[:, None]).reshape(len(times), -1)
+
+    def _make_room(self, k: int, count: int) -> None:
+        """Move the places from k on; of those ahead nothing is known but times and what is to be done there."""
+        size, room = self.t.size, len(self._rooms.get("t", ()))
+        if size + count > room:
+            for name in ("t", "stops", "due", "kept", "driven", "x", "z", "held"):
+                old = getattr(self, name)
+                self._rooms[name] = np.empty((2 * (size + count), *old.shape[1:]), dtype=old.dtype)
+                self._rooms[name][:size] = old
+        for name, rows in self._rooms.items():
+            if name in ("t", "stops", "due", "kept", "driven"):
+                rows[k + count : size + count] = rows[k:size]
+            setattr(self, name, rows[: size + count])
 
     def repeat(self, k: int, *, written: bool) -> None:
         """Give place k a second one behind what jumps there; written: whether results show the first."""
         self.insert(k, self.t[k : k + 1])
         self.x[k + 1], self.z[k + 1] = self.x[k], self.z[k]
         if not written:
-            self.kept[self.kept == k] = k + 1
+            self.kept[k : k + 2] = False, self.kept[k]
 
     def show(self, before: int, behind: int) -> None:
         """Let results have both sides of a jump; where rounding put it behind an output point, it is there."""
         near = max(before - 1, 0)
-        if near in self.kept and self.t[before] - self.t[near] <= NEAR * np.spacing(abs(self.t[before])):
+        if self.kept[near] and self.t[before] - self.t[near] <= NEAR * np.spacing(abs(self.t[before])):
             self.t[before : behind + 1] = self.t[near]
             before = near
-        self.kept = np.union1d(self.kept, (before, behind))
+        self.kept[[before, behind]] = True
 
     def stop_at(self, t: float, behind: int) -> None:
         """Let an integration end at a time behind a place."""

@@ -359,3 +359,15 @@ def test_derivatives_that_only_the_sampling_asks_for_are_found():
         ModelError, match="input course is differentiated 1 times by the model, which samples do"
     ):
         simulate(Rates(), stop=1.0, inputs={"course": ([0.0, 1.0], [0.0, 1.0])})
+
+
+@pytest.mark.parametrize("points", [2, 3, 21])
+def test_what_is_sampled_is_found_between_output_points(points):
+    found = simulate(Counter(), stop=2.0, points=points)
+    times = np.linspace(0.0, 2.0, 97)
+    count = np.floor(times / 0.1 + 1e-9) + 1
+    assert found.time.size == points
+    np.testing.assert_array_equal(found.at(times, "count"), count)
+    np.testing.assert_array_equal(found.select(["count"]).at(times, "count"), count)
+    np.testing.assert_array_equal(found.at(times[5:], "before"), count[5:] - 1)
+    assert found.at(0.25, "double") == 6.0

@@ -5,7 +5,8 @@ whose conditions became true act, in rounds: Discretes and states get new values
 consistent, the switches get their sides anew, until no condition becomes true any more.
 """
 
-from itertools import product
+from collections.abc import Sequence
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -18,12 +19,15 @@ from gantrytau.simulation.events.sticking import HOLDS, WHENS
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.singular_poses import Point
-from gantrytau.simulation.trail import LEAST_STEPS, Trail
+from gantrytau.simulation.trail import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
-SAME_INSTANT = 50  # events within SHORT of the run: chattering
-SHORT = 1e-9
-MOST_EVENTS = 500  # in a 500th of the run
+CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
+MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
+HALVES = 5
+SHRINKING = (
+    0.42  # of an interval between two turns to that after half as many: less than 1 / 2, which is 1 / k
+)
 HOP = (
     1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
 )
@@ -38,7 +42,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self.events: list[float] = []  # times at which states made something switch
+        self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -136,7 +140,7 @@ class Changes:
                 if k > left and not sampled and switches.jumped(self.point(left), self.point(k)):
                     trail.show(left, k)
             if by_states:
-                self._count(self.modes(k), first, float(trail.t[k]))
+                self._watch_chatter(k, self.modes(k) != first, margins)
         k = self._act(left, k)
         end = self.by_time.next(float(trail.t[k]), trail.inputs(k))
         if end is not None and not self.ended:
@@ -145,6 +149,8 @@ class Changes:
 
     def _refuse_outside(self, k: int, modes: np.ndarray) -> None:
         """SolveError if a table that is not defined beyond its ends is left at a place that gets these modes."""
+        if not self.coordinates.dae.flat.ranges:
+            return
         x, z, t, w = self.point(k)
         w = np.concatenate([w[: w.size - modes.size], modes])
         for number in np.flatnonzero(np.array(self.coordinates.rounds.left(x, z, t, t, w)).ravel()):
@@ -322,14 +328,29 @@ class Changes:
         trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 
-    def _count(self, modes: np.ndarray, before: np.ndarray, t: float) -> None:
-        """SolveError if states made something switch too often."""
-        events = self.events
-        events.append(t)
-        for many, share in ((SAME_INSTANT, SHORT), (MOST_EVENTS, 1 / LEAST_STEPS)):
-            if len(events) > many and t - events[-many] < share * self.span:
-                conditions = self.conditions(np.flatnonzero(modes != before))
-                raise run_ends.chattering(self.coordinates.dae, t, conditions)
+    def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
+        """SolveError if what states made switch turns again and again, and does not leave zero in between or accumulates."""
+        t = float(self.trail.t[k])
+        whole = self.coordinates.switches.whole(before.values)
+        turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
+        for i in turned.tolist():
+            hops, times = self._turned.setdefault(i, (0, []))
+            last = times[-1] if times else -np.inf
+            # of a parabola: the farthest
+            near = abs(before.rates[0, i]) / 4 < HOP * before.noise[0, i] / (t - last) if t > last else True
+            hops = hops + 1 if near else 0
+            times.append(t)
+            self._turned[i] = hops, times
+            if hops >= CHATTERS:
+                raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
+            if len(times) in MANY and accumulate(times):
+                raise run_ends.never_past(self.coordinates.dae, t, self.conditions(turned))
+
+
+def accumulate(times: Sequence[float]) -> bool:
+    """Whether intervals shrink faster than 1 / k, at k and at each half of it, so that their sum has a limit."""
+    last = [times[(len(times) >> n) - 1] - times[(len(times) >> n) - 2] for n in range(HALVES + 1)]
+    return all(later < SHRINKING * earlier for later, earlier in pairwise(last))
 
 
 def _at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:

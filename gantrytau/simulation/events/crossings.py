@@ -11,6 +11,7 @@ from gantrytau.simulation.singular_poses import Point
 
 DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at
 MOST = 100  # steps to one crossing
+HALVINGS = 50  # of a share of an interval: to rounding
 JUST_BEHIND = 16  # times rounding: near enough behind the crossing
 
 
@@ -27,7 +28,7 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
     """The first step between places t (n,) in s in which a gap falls below zero, or may dip below it."""
     h = np.diff(t)[:, None]
     g0, g1 = gaps.values[:-1], gaps.values[1:]
-    below = g1 < -gaps.noise[1:]
+    below = gaps.below[1:]
     # the cubic through values and rates at both ends: g0 + b s + c s^2 + d s^3
     b, e = h * gaps.rates[:-1], h * gaps.rates[1:]
     c, d = 3 * (g1 - g0) - 2 * b - e, 2 * (g0 - g1) + b + e
@@ -41,7 +42,7 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
     if not rows.size:
         return None
     k = int(rows[0])
-    found = [_zero(g0[k, i], b[k, i], c[k, i], d[k, i]) for i in np.flatnonzero(below[k])]
+    found = [_zero(*(float(part[k, i]) for part in (g0, b, c, d))) for i in np.flatnonzero(below[k])]
     if found:
         return Crossing(k, float(t[k] + min(found) * h[k, 0]), True)
     return Crossing(k, float(t[k] + np.min(s[k, dips[k]]) * h[k, 0]), False)
@@ -49,30 +50,35 @@ def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
 
 def _zero(a: float, b: float, c: float, d: float) -> float:
     """The first zero of a falling cubic between 0, where it is not below zero but for rounding, and 1, where it is."""
-    roots = np.roots([d, c, b, a]).tolist() if np.all(np.isfinite([a, b, c, d])) else []
-    real = [root.real for root in roots if abs(root.imag) < 1e-9 and 0 < root.real < 1]
-    inside = [s for s in real if b + s * (2 * c + s * 3 * d) <= 0]
-    return min(inside, default=0.5)
+    low, high = 0.0, 1.0
+    root = c * c - 3 * b * d
+    if root > 0 and c + np.sqrt(root) != 0:  # the minimum
+        lowest = -b / (c + np.sqrt(root))
+        high = lowest if 0 < lowest < 1 and a + lowest * (b + lowest * (c + lowest * d)) < 0 else high
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if a + middle * (b + middle * (c + middle * d)) < 0 else (middle, high)
+    return high
 
 
 def located(
     low: Point,
-    end: float,
+    high: Point,
     guess: float,
     step: Callable[[Point, float], Point],
     look: Callable[[Point], Margins],
-) -> Point:
-    """The point just behind the first crossing after `low`, which lies before the time `end`.
+) -> Point | None:
+    """The point just behind the first crossing after `low`, up to `high`, which lies behind it; None if no step leads there.
 
     step: the point some seconds later, RuntimeError or SolveError where there is none. Newton steps on the gaps,
     each from the last point before the crossing, so that what is left to go is found to the rounding of time.
     """
-    high: Point | None = None
+    end = high[2]  # up to which steps lead
     width = end - low[2]
     for count in range(MOST):
         least = 4 * np.spacing(max(abs(low[2]), abs(end)))
-        if end - low[2] <= least and high is not None:
-            return high
+        if end - low[2] <= least:
+            break
         if not low[2] + least / 4 < guess < end or (count % 4 == 3 and end - low[2] > width / 8):
             guess = (low[2] + end) / 2
         width = end - low[2] if count % 4 == 3 else width
@@ -96,6 +102,4 @@ def located(
         with np.errstate(divide="ignore", invalid="ignore"):
             waits = np.where(falling, (left + gaps.noise[0]) / -gaps.rates[0], np.inf)
         guess = there[2] + float(np.min(waits, initial=np.inf))
-    if high is None:
-        raise SolveError("the crossing is not reached", time=low[2])
-    return high
+    return high if end == high[2] else None

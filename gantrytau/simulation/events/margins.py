@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.singular_poses import Point
 
 JUMP = 1e-6  # of the largest rate or algebraic: less is no jump
@@ -27,6 +27,15 @@ class Margins:
     def blurred(self, errors: np.ndarray | float) -> "Margins":
         """The same, known no better than by some errors."""
         return Margins(self.values, self.rates, np.maximum(self.noise, errors))
+
+    @property
+    def below(self) -> np.ndarray:
+        """Which are below zero."""
+        return self.values < -self.noise
+
+    def until(self, count: int) -> "Margins":
+        """The same at the first places."""
+        return Margins(self.values[:count], self.rates[:count], self.noise[:count])
 
 
 class Switches:
@@ -59,9 +68,9 @@ class Switches:
             change = ca.jacobian(algebraic, time) + (ca.jacobian(algebraic, x) @ ode if x.numel() else 0)
             found += [by_z, ca.jacobian(algebraic, z), change]
         dense = [ca.densify(e) for e in found]
-        self._moves = ca.Function("moves", list(arguments), [ca.densify(ode)])
+        self._moves = AtPlaces(ca.Function("moves", list(arguments), [ca.densify(ode)]))
         self._slopes = ca.Function("slopes", list(arguments), [ca.densify(by_x)])
-        self._look = ca.Function("margins", [*arguments, self._size], dense, {"cse": True})
+        self._look = AtPlaces(ca.Function("margins", [*arguments, self._size], dense, {"cse": True}))
 
     def __len__(self) -> int:
         return len(self.turns)
@@ -69,8 +78,7 @@ class Switches:
     def look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray, size: np.ndarray) -> Margins:
         """The margins at places: x (places, n), z (places, m), t (places,), w (places, k); size: of states, (n,)."""
         places = len(t)
-        sizes = np.broadcast_to(size, (places, size.size))
-        found = at_places(self._look, x, z, t[:, None], t[:, None], w, sizes)
+        found = self._look(x, z, t, t, w, size[None])
         values, rates, terms = found[:3]
         if self._of_algebraics:
             m = z.shape[1]
@@ -87,7 +95,9 @@ class Switches:
 
     def jumped(self, before: Point, after: Point) -> bool:
         """Whether rates or algebraics differ at two places of one instant; at a kink they do not."""
-        moves = [np.append(np.array(self._moves(x, z, t, t, w)), z) for x, z, t, w in (before, after)]
+        moves = [
+            np.append(self._moves(x[None], z[None], t, t, w[None])[0], z) for x, z, t, w in (before, after)
+        ]
         size = np.abs(moves).max(initial=0.0)
         return bool(np.any(np.abs(moves[1] - moves[0]) > JUMP * size))
 
@@ -114,6 +124,8 @@ class Switches:
         sign = np.where(self._counts, 1.0, 2 * modes - 1)
         first = sign * margins.values - np.where(self._counts, modes, 0.0)
         counts = self._counts
+        if not counts.any():
+            return Margins(first, sign * margins.rates, margins.noise)
         second = modes[..., counts] + 1 - margins.values[:, counts]
         return Margins(
             np.hstack([first, second]),
@@ -121,10 +133,14 @@ class Switches:
             np.hstack([margins.noise, margins.noise[:, counts]]),
         )
 
+    def of_gaps(self, chosen: np.ndarray) -> np.ndarray:
+        """The switches of some columns of `gaps`."""
+        return np.append(np.arange(len(self)), np.flatnonzero(self._counts))[chosen]
+
     def behind(self, gap: int, point: Point, modes: np.ndarray, size: np.ndarray) -> np.ndarray:
         """The states moved by the shortest way to just behind where a gap is zero."""
         x, z, t, w = point
-        index = gap if gap < len(self) else int(np.flatnonzero(self._counts)[gap - len(self)])
+        index = int(self.of_gaps(np.array([gap]))[0])
         slopes = np.array(self._slopes(x, z, t, t, w))[index]
         for _ in range(2):
             margins = self.look(x[None], z[None], np.array([t]), w[None], size)

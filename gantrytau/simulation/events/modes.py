@@ -13,6 +13,7 @@ from gantrytau.compiler.alphabets import Substitution, column, values_at
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
+from gantrytau.simulation.events.poles import without_poles
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +67,7 @@ def sorted_out(
     moving: expressions of the motions; margins come out in their symbols, as those of `substitution` lead to them.
     """
     margins = substitution.inserted([turn.margin for turn in turns])
+    margins = [m if turn.counts else without_poles(m) for turn, m in zip(turns, margins, strict=True)]
     turns = [Turn(turn.mode, m, turn.closed, turn.counts) for turn, m in zip(turns, margins, strict=True)]
     own = {turn.mode.name() for turn in turns}
     turns = _in_order(turns, own)

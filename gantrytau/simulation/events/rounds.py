@@ -10,7 +10,7 @@ from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.flattening.flat_model import When
 from gantrytau.flattening.whens import Jump, one_round
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.singular_poses import Point
 
@@ -36,10 +36,10 @@ class Rounds:
     whens: tuple[When, ...]
     places: np.ndarray
     of: tuple[tuple[int, ...], ...]
-    conditions: ca.Function
+    conditions: AtPlaces
     left: ca.Function
     past: ca.SX
-    jump: ca.Function
+    jump: AtPlaces
 
     def holding(self, point: Point) -> np.ndarray:
         """Which conditions hold at a point."""
@@ -50,12 +50,9 @@ class Rounds:
         return Made(*self._at(self.jump, point, rose.astype(float)))
 
     @staticmethod
-    def _at(function: ca.Function, point: Point, *more: np.ndarray) -> list[np.ndarray]:
+    def _at(function: AtPlaces, point: Point, *more: np.ndarray) -> list[np.ndarray]:
         x, z, t, w = point
-        now = np.array([[t]])
-        return [
-            f[0] for f in at_places(function, x[None], z[None], now, now, w[None], *(a[None] for a in more))
-        ]
+        return [f[0] for f in function(x[None], z[None], t, t, w[None], *(a[None] for a in more))]
 
 
 def rounds_of(
@@ -87,10 +84,10 @@ def rounds_of(
         dae.flat.whens,
         np.array([states.index(a.symbol) for a in roots], dtype=int),
         _switches_of(conditions, switches),
-        ca.Function("conditions", list(arguments), [ca.densify(conditions)], {"cse": True}),
+        AtPlaces(ca.Function("conditions", list(arguments), [ca.densify(conditions)], {"cse": True})),
         ca.Function("left", list(arguments), [ca.densify(left)], {"cse": True}),
         past,
-        ca.Function("jump", [*arguments, *rose], made, {"cse": True}),
+        AtPlaces(ca.Function("jump", [*arguments, *rose], made, {"cse": True})),
     )
 
 
