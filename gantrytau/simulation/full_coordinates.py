@@ -153,6 +153,7 @@ class Coordinates:
                 options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
+        options["linear_solver"] = "csparse"
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
     @property

@@ -74,10 +74,6 @@ class Run:
         """Why it ended: "stop", or what a when said."""
         return self.changes.ended or "stop"
 
-    def largest(self) -> np.ndarray:
-        """The largest absolute value of each state so far."""
-        return np.abs(self.trail.x[: self.done + 1]).max(axis=0)
-
     def go(self) -> None:
         trail = self.trail
         self.done = self.changes.begin()

@@ -148,7 +148,7 @@ def _sized_run(
             run.go()
         except (SolveError, KeyboardInterrupt) as error:
             return run, error
-        sizes = seen_sizes(coordinates, run.largest()) if left else None
+        sizes = seen_sizes(coordinates, run.trail, run.done, MARGIN * tolerance) if left else None
         if sizes is None:
             return run, None
         coordinates, left = coordinates.sized(sizes), left - 1
