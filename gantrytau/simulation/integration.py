@@ -288,13 +288,20 @@ class Run:
 
     def _doubts(self, places: np.ndarray) -> np.ndarray:
         """Whether a singular pose may lie between successive places."""
-        return doubtful(self.trail.t[places], self._look(*self.changes.columns(places)))
+        columns = self.changes.columns(places)
+        look = self._look(*columns)
+        sides = self.coordinates.conditioning.sides(columns[-1])
+        alike = np.all(sides[1:] == sides[:-1], axis=1)  # else there is no measure in common
+        return doubtful(columns[2], look) & (alike | look.near[1:])
 
     def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
         return self.coordinates.conditioning.look(x, z, t[:, None], t[:, None], w)
 
     def _weakest(self, point: Point) -> list[str]:
-        return self.coordinates.weakest(point, self.changes.point(0))
+        """What degenerates at a point, though it was sound behind the last event."""
+        sides = self.coordinates.conditioning.sides(self.trail.rows(np.arange(self.done + 1)))
+        turned = np.flatnonzero(np.any(sides[1:] != sides[:-1], axis=1))
+        return self.coordinates.weakest(point, self.changes.point(int(turned[-1]) + 1 if turned.size else 0))
 
     def _singular_pose(self, found: Approach) -> SolveError:
         return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))

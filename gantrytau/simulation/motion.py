@@ -58,6 +58,8 @@ def all_coordinates(
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)
     divisors = _divisors(solved, pivots, list(last), list(highest))
+    first = 2 * len(sampled) + len(held)
+    at_events = [*range(first, first + len(dae.flat.discretes)), *range(width, w.numel())]
     return Coordinates(
         dae=dae,
         states=states,
@@ -80,7 +82,7 @@ def all_coordinates(
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
+        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments, at_events),
     )
 
 
