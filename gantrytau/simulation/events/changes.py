@@ -5,6 +5,7 @@ whose conditions became true act, in rounds: Discretes and states get new values
 consistent, the switches get their sides anew, until no condition becomes true any more.
 """
 
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
@@ -310,7 +311,19 @@ class Changes:
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors), modes):
                     return
+        if np.ndim(errors) == 0:  # margins may follow from large numbers that cancel: then rates decide
+            self.modes(k)[:] = tried[0]
+            return self._agree(k, tried[1], self._rounding(k, tried))
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
+
+    def _rounding(self, k: int, tried: Sequence[np.ndarray]) -> np.ndarray:
+        """What rounding makes of the margins of a place, (switches,), the most in some modes."""
+        found = []
+        for modes in tried:
+            self._led_to(k, modes, 0.0)
+            found.append(self.coordinates.switches.rounding(self.point(k)))
+        self.modes(k)[:] = tried[0]
+        return np.max(found, axis=0)
 
     def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float) -> np.ndarray:
         """The modes that belong to the margins of a place that has these modes."""
