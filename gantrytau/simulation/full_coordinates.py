@@ -85,6 +85,12 @@ class Coordinates:
         return bool(self.sampled or self.held or self.discretes or self.dae.flat.delays or len(self.switches))
 
     @property
+    def curved(self) -> bool:
+        """Whether rates depend on states other than linearly."""
+        moving, unknown = ca.vertcat(self.ode, self.algebraic), ca.vertcat(self.x, self.z)
+        return self.kept("curved", lambda: ca.depends_on(ca.jacobian(moving, unknown), unknown))
+
+    @property
     def delay_columns(self) -> slice:
         """Where the coefficients of delayed values, six of each, stand in what is held."""
         first = len(self.held) + len(self.discretes)

@@ -15,6 +15,7 @@ from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.memory.past_values import PastValues
+from gantrytau.simulation.path import Path
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
@@ -23,11 +24,13 @@ from gantrytau.simulation.trail import LEAST_STEPS, Trail
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
 REST = 10.0  # times the tolerance: what may be left of a margin
+PARTS = 4  # of a smooth run: in each the integrator starts anew, in steps of first order
 GROWTH = 10  # of a stretch in which nothing has switched
 STEPS_BETWEEN = (
     8  # of the integrator between two places at which switches are looked at: more, and they are laid closer
 )
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
+SOMETIMES = 0.1  # the same, where it starts anew at events
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 REFINED = 50  # intervals ahead that are divided as well
@@ -52,9 +55,11 @@ class Run:
             longest = min(longest or np.inf, self.span / LEAST_STEPS)
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
+        self.path = Path(coordinates)
         interval = float(np.diff(self.trail.t).max())
         often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
-        exact = max(OFTEN * tolerance, min(LEAST, tolerance)) if often else tolerance
+        own = OFTEN if often else SOMETIMES if len(coordinates.switches) or coordinates.rounds.whens else 1.0
+        exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
@@ -130,9 +135,13 @@ class Run:
         return True
 
     def _shorter(self) -> float | None:
-        """The longest step of what lies ahead, s, where a function of time changes after it was at rest."""
+        """The longest step of what lies ahead, s, where a function of time changes after it was at rest, or forces are
+        narrow along the path.
+        """
         t = self.trail.t[self.done : self.done + 2]
-        return self.pulses.step if self.pulses.within(float(t.sum()) / 2) else None
+        steps = [self.path.longest(float(t[0]))]
+        steps += [self.pulses.step] if self.pulses.within(float(t.sum()) / 2) else []
+        return min(steps) if np.isfinite(min(steps)) else None
 
     def _hold_together(self, places: np.ndarray) -> None:
         """SolveError if constraints that were left out as redundant no longer hold at places."""
@@ -149,7 +158,7 @@ class Run:
             return min(CHUNK, last)
         if len(coordinates.switches):
             return CHUNK * GROWTH
-        return min(last, max(CHUNK, last // 50))
+        return max(CHUNK, last // PARTS)
 
     def _nearer(self) -> bool:
         """Whether something is about to switch where the integration fails: then the next place is laid nearer.
@@ -200,6 +209,8 @@ class Run:
             raise RuntimeError("the constraints cannot be met any more") from error
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         if self.history and self.history.too_wide(here, count):
+            return False
+        if self.path.stepped_over(trail, here, count, self.integrators.steps, self.integrators.sizes):
             return False
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place

@@ -108,10 +108,11 @@ class Conditioning:
 
     def look(self, *points: np.ndarray) -> Look:
         """What is to be seen at points, given by the arguments with one row per point."""
-        sides, own = np.unique(self.sides(points[-1]), axis=0, return_inverse=True)
+        sides = self.sides(points[-1])
+        if np.all(sides[:1] == sides):
+            return self._look(sides[0], *points)
+        sides, own = np.unique(sides, axis=0, return_inverse=True)
         found = [self._look(side, *(p[own.ravel() == k] for p in points)) for k, side in enumerate(sides)]
-        if len(found) == 1:
-            return found[0]
         order = np.argsort(np.argsort(own.ravel(), kind="stable"), kind="stable")
         parts = zip(*((one.side, one.distance, one.regular) for one in found), strict=True)
         return Look(*(np.concatenate(part)[order] for part in parts))

@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.translated import Translated
-from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.path import Path
 from gantrytau.simulation.trail import Trail
 
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
@@ -88,17 +88,12 @@ def _noise(coordinates: Coordinates, trail: Trail, done: int) -> np.ndarray:
     """
     places = np.unique(np.linspace(0, done, LOOKED_AT).astype(int))
     x, z, t, w = trail.x[places], trail.z[places], trail.t[places, None], trail.rows(places)
-    rates = coordinates.kept("rates", lambda: _rates(coordinates))
+    rates = Path(coordinates).rates
     found = []
     for sign in (-2, -1, 0, 1, 2):
         near = 1 + sign * np.finfo(float).eps
         found.append(at_places(rates, x * near, z * near, t * near, t, w)[0])
     return np.nan_to_num(np.ptp(found, axis=0)).max(axis=0)
-
-
-def _rates(coordinates: Coordinates) -> ca.Function:
-    arguments = [coordinates.x, coordinates.z, time, coordinates.t0, coordinates.w]
-    return ca.Function("rates", arguments, [ca.densify(coordinates.ode)], {"cse": True})
 
 
 def _rounded(sizes: Iterable[float]) -> tuple[float, ...]:
