@@ -131,6 +131,7 @@ class Run:
             self.done = self.changes.behind_inputs(self.done)
             self.changes.renew(self.done)
         if self.sampler.leaves_switches:
+            self.changes.was_sampled(self.done)
             self.done = self.changes.turn(self.done)
         return True
 

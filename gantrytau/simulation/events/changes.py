@@ -108,6 +108,15 @@ class Changes:
         trail.held[k, : due.size][due] = new[due]
         trail.z[k] = self._settled(k)
 
+    def was_sampled(self, k: int) -> None:
+        """Keep what was at a place before its variables got their new values, for whens that act there."""
+        trail = self.trail
+        if not (self._holding.size and trail.due[k].any() and k > 0):
+            return
+        held, trail.held[k] = trail.held[k].copy(), trail.held[k - 1]
+        self._unsampled = k, trail.held[k].copy(), self._settled(k)
+        trail.held[k] = held
+
     def behind_inputs(self, k: int) -> int:
         """From the place before a jump of inputs to that behind it, which is returned."""
         trail = self.trail
