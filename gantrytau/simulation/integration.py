@@ -13,9 +13,10 @@ from gantrytau.simulation.events.crossings import Crossing, first_crossing, loca
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.integrators import Integrators
+from gantrytau.simulation.integrators import MOST_STEPS, WALKED_STEPS, Integrators
 from gantrytau.simulation.memory.past_values import PastValues
-from gantrytau.simulation.path import Path
+from gantrytau.simulation.between.across import across, lay, left_at
+from gantrytau.simulation.between.path import Path
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
@@ -46,8 +47,9 @@ class Run:
         grid: np.ndarray,
         tolerance: float,
         longest: float | None = None,
+        crosses: bool = False,
     ):
-        """tolerance: of one step; longest: step of the integrator, s."""
+        """tolerance: of one step; longest: step of the integrator, s; crosses: singular poses with the speeds before them."""
         self.coordinates = coordinates
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
@@ -61,6 +63,8 @@ class Run:
         own = OFTEN if often else SOMETIMES if len(coordinates.switches) or coordinates.rounds.whens else 1.0
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
+        self.crosses, self.crossed = crosses, list[float]()  # times, s
+        self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up where a pose stands in the way
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -100,7 +104,7 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if count == 1 and not self._nearer():
+                    if count == 1 and not self._nearer() and not (self.crosses and self._across(self._approach())):
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
@@ -215,7 +219,8 @@ class Run:
             return False
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place
-        self._watch(here, self.done)
+        if self._watch(here, self.done):
+            return False
         self._hold_together(reached)
         return found is not None and self._cross(found)
 
@@ -277,10 +282,10 @@ class Run:
         gaps = look(there)
         return bool(np.any(gaps.values < -gaps.noise))
 
-    def _watch(self, first: int, last: int) -> None:
-        """SolveError if a singular pose lies between two places; `done` is then the last before it."""
+    def _watch(self, first: int, last: int) -> bool:
+        """Whether a singular pose between two places was crossed; SolveError, `done` being the last before it, if it was not."""
         if not self.coordinates.conditioning.needed:
-            return
+            return False
         trail = self.trail
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
@@ -288,15 +293,28 @@ class Run:
         times = np.arange(float(trail.t[places[0]]), float(trail.t[last]), self.span / LEAST_STEPS)
         some = places[np.unique(np.append(np.searchsorted(trail.t[places[:-1]], times), places.size - 1))]
         if 2 * some.size < places.size and not self._doubts(some).any():
-            return
+            return False
         for k in places[:-1][self._doubts(places)]:
             if k <= self.seen:
                 continue
             self.done = self.seen = int(k)
             found = self._approach()
             if found.singular or (not found.arrived and self._weakest(found.point)):
-                raise self._singular_pose(found)
+                if not self._across(found):
+                    raise self._singular_pose(found)
+                return True
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
+        return False
+
+    def _across(self, found: Approach) -> bool:
+        """Whether a singular pose is crossed, if it may be: `done` is then behind it."""
+        begin = int(np.searchsorted(self.trail.t[: self.done + 1], left_at(found))) - 1
+        way = across(found, self.changes.point(begin), self.integrators) if self.crosses and begin >= 0 else None
+        if way is None:
+            return False
+        self.done = self.seen = lay(self.trail, begin, *way)
+        self.crossed.append(found.zero)
+        return True
 
     def _doubts(self, places: np.ndarray) -> np.ndarray:
         """Whether a singular pose may lie between successive places."""

@@ -46,6 +46,7 @@ def simulate(
     starts: Mapping[str, Any] | None = None,
     max_step: float | None = None,
     seed: int | None = None,
+    singular: str = "stop",
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
@@ -63,6 +64,8 @@ def simulate(
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
     exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
+    singular: "stop" with SolveError at a pose where forces are not determined, or "cross" it with the speeds before it, where
+    the motion goes on smoothly: ways to move part there, and continuity of speeds decides. A warning has the times.
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
@@ -70,6 +73,10 @@ def simulate(
     that are not finite although the states are.
     """
     _check(start, stop, tolerance, points, max_step)
+    if singular not in ("stop", "cross"):
+        raise ModelError(
+            f"simulate: found singular={singular!r}, expected 'stop' or 'cross'", argument="singular"
+        )
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -82,7 +89,7 @@ def simulate(
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)
     _check_inputs(dae, signals)
     grid = np.linspace(start, stop, points)
-    result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs)
+    result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs, singular == "cross")
     doubt = doubts(result)
     if doubt:
         warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
@@ -97,14 +104,17 @@ def _all_runs(
     tolerance: float,
     max_step: float | None,
     outputs: Sequence[str] | None,
+    crosses: bool,
 ) -> Result:
     """One run over a grid, or several where constraints that repeat others are chosen anew; SolveError with the result so
     far where it stops before its end.
     """
     parts: list[Result] = []
+    crossed: list[float] = []
     left = grid
     while True:
-        run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
+        run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step, crosses)
+        crossed += run.crossed
         ended = run.ended if error is None else str(error) or "interrupted"
         parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))
         found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
@@ -112,6 +122,14 @@ def _all_runs(
             break
         left, dae = found
     result = joined(parts, grid)
+    if crossed:
+        times = ", ".join(f"{t:.6g}" for t in crossed)
+        warnings.warn(
+            f"{dae.name}: singular poses were crossed with the speeds before them at t = {times} s; forces are not "
+            "determined there",
+            DoubtfulResult,
+            stacklevel=3,
+        )
     if isinstance(error, SolveError):
         error.result = result
         raise error
@@ -138,12 +156,13 @@ def _sized_run(
     grid: np.ndarray,
     tolerance: float,
     max_step: float | None,
+    crosses: bool,
 ) -> tuple[Run, SolveError | KeyboardInterrupt | None]:
     """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
     coordinates = coordinates.sized(first_sizes(coordinates))
     left = ROUNDS
     while True:
-        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step)
+        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step, crosses)
         try:
             run.go()
         except (SolveError, KeyboardInterrupt) as error:
