@@ -64,7 +64,9 @@ class Run:
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.crosses, self.crossed = crosses, list[float]()  # times, s
-        self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up where a pose stands in the way
+        self.integrators.most = (
+            WALKED_STEPS if crosses else MOST_STEPS
+        )  # soon given up where a pose stands in the way
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -104,7 +106,11 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if count == 1 and not self._nearer() and not (self.crosses and self._across(self._approach())):
+                    if (
+                        count == 1
+                        and not self._nearer()
+                        and not (self.crosses and self._across(self._approach()))
+                    ):
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
@@ -309,7 +315,11 @@ class Run:
     def _across(self, found: Approach) -> bool:
         """Whether a singular pose is crossed, if it may be: `done` is then behind it."""
         begin = int(np.searchsorted(self.trail.t[: self.done + 1], left_at(found))) - 1
-        way = across(found, self.changes.point(begin), self.integrators) if self.crosses and begin >= 0 else None
+        way = (
+            across(found, self.changes.point(begin), self.integrators)
+            if self.crosses and begin >= 0
+            else None
+        )
         if way is None:
             return False
         self.done = self.seen = lay(self.trail, begin, *way)

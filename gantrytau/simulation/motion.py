@@ -82,7 +82,9 @@ def all_coordinates(
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments, at_events),
+        conditioning=Conditioning(
+            *_constraints(dae, invariants, states), divisors, matrices, arguments, at_events
+        ),
     )
 
 

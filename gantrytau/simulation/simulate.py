@@ -113,7 +113,9 @@ def _all_runs(
     crossed: list[float] = []
     left = grid
     while True:
-        run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step, crosses)
+        run, error = _sized_run(
+            _coordinates(dae, signals, wanted), signals, left, tolerance, max_step, crosses
+        )
         crossed += run.crossed
         ended = run.ended if error is None else str(error) or "interrupted"
         parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended))

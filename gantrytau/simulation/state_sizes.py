@@ -15,7 +15,9 @@ from gantrytau.simulation.trail import Trail
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
 LEAST = 1e-6  # of the largest state that it hangs together with: a smaller one may be rounding
 ROUNDING = 8 * np.finfo(float).eps  # of the largest start among such states: a smaller one is rounding
-STEP = 1 / 500  # of a run, that an integrator is to go on in one step through what rounding makes of the rates
+STEP = (
+    1 / 500
+)  # of a run, that an integrator is to go on in one step through what rounding makes of the rates
 LOOKED_AT = 64  # places of a run at most, at which rates are asked for their rounding
 
 
@@ -47,7 +49,9 @@ def first_sizes(coordinates: Coordinates) -> tuple[float, ...]:
     )
 
 
-def seen_sizes(coordinates: Coordinates, trail: Trail, done: int, tolerance: float) -> tuple[float, ...] | None:
+def seen_sizes(
+    coordinates: Coordinates, trail: Trail, done: int, tolerance: float
+) -> tuple[float, ...] | None:
     """Sizes of the states after a run up to a place, if those before were much too large; else None.
 
     States that hang together are asked together: a small one among large ones may be nothing but rounding, and keeps its

@@ -81,7 +81,9 @@ def lay(trail: Trail, k: int, way: Across, behind: Point) -> int:
     """Fill the places of a trail behind place k up to the point behind the pose, of which the place is returned."""
     end = k + int(np.searchsorted(trail.t[k:], behind[2]))
     trail.insert(end - 1, np.array([behind[2]]), stop=True)
-    trail.stops[min(end + 1, trail.last)] = True  # the interval behind it is another than those before and behind
+    trail.stops[min(end + 1, trail.last)] = (
+        True  # the interval behind it is another than those before and behind
+    )
     places = np.arange(k + 1, end + 1)
     trail.held[places] = trail.held[k]
     trail.x[places] = way.at(trail.t[places])

@@ -73,7 +73,9 @@ class Path:
         n, m = len(self.coordinates.states), len(self.coordinates.algebraics)
         parts = at_places(self._jacobian, *point)
         shapes = (n, n), (m, n), (n, m), (m, m)  # columns, rows
-        by_x, by_z, own, inner = (np.nan_to_num(p[0]).reshape(k).T for p, k in zip(parts, shapes, strict=True))
+        by_x, by_z, own, inner = (
+            np.nan_to_num(p[0]).reshape(k).T for p, k in zip(parts, shapes, strict=True)
+        )
         return by_x - by_z @ np.linalg.lstsq(inner, own, rcond=None)[0] if m else by_x
 
     @property

@@ -39,6 +39,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
+        self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self.events: list[float] = []  # times at which states made something switch
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
@@ -63,7 +64,7 @@ class Changes:
 
     def margins(self, places: np.ndarray) -> Margins:
         """The margins at places."""
-        return self.coordinates.switches.look(*self.columns(places), self.sizes)
+        return self.coordinates.switches.look(*self.columns(places), self.sizes).blurred(self._rounded)
 
     def conditions(self, switches: np.ndarray) -> list[str]:
         """What some switches ask for, in the model's words."""
@@ -320,9 +321,11 @@ class Changes:
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors), modes):
                     return
-        if np.ndim(errors) == 0:  # margins may follow from large numbers that cancel: then rates decide
-            self.modes(k)[:] = tried[0]
-            return self._agree(k, tried[1], self._rounding(k, tried))
+        before, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried))
+        if np.any(
+            self._rounded > before
+        ):  # margins may follow from large numbers that cancel: then rates decide
+            return self._agree(k, tried[1], errors)
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
     def _rounding(self, k: int, tried: Sequence[np.ndarray]) -> np.ndarray:
