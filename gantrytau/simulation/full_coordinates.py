@@ -147,6 +147,7 @@ class Coordinates:
             "max_num_steps": steps,
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
+            "linear_solver": "csparse",  # the QR of CasADi fails by entries whose squares are no numbers
         }
         if longest is not None and np.isfinite(longest):
             options["max_step_size"] = longest
@@ -154,12 +155,10 @@ class Coordinates:
             options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
-            options["linear_solver"] = "csparse"
             if size > 1:
                 options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
-        options["linear_solver"] = "csparse"
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
     @property

@@ -8,6 +8,8 @@ from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
+from gantrytau.simulation.between.across import across, lay, left_at
+from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.events.changes import SHORT, Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.margins import ROUNDING, Margins
@@ -15,8 +17,6 @@ from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import MOST_STEPS, WALKED_STEPS, Integrators
 from gantrytau.simulation.memory.past_values import PastValues
-from gantrytau.simulation.between.across import across, lay, left_at
-from gantrytau.simulation.between.path import Path
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
@@ -49,7 +49,7 @@ class Run:
         longest: float | None = None,
         crosses: bool = False,
     ):
-        """tolerance: of one step; longest: step of the integrator, s; crosses: singular poses with the speeds before them."""
+        """tolerance: of one step; longest: step of the integrator, s; crosses: whether it crosses singular poses."""
         self.coordinates = coordinates
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
@@ -57,7 +57,7 @@ class Run:
             longest = min(longest or np.inf, self.span / LEAST_STEPS)
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
-        self.path = Path(coordinates)
+        self.narrow = NarrowForces(coordinates)
         interval = float(np.diff(self.trail.t).max())
         often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
         own = OFTEN if often else SOMETIMES if len(coordinates.switches) or coordinates.rounds.whens else 1.0
@@ -150,7 +150,7 @@ class Run:
         narrow along the path.
         """
         t = self.trail.t[self.done : self.done + 2]
-        steps = [self.path.longest(float(t[0]))]
+        steps = [self.narrow.longest(float(t[0]))]
         steps += [self.pulses.step] if self.pulses.within(float(t.sum()) / 2) else []
         return min(steps) if np.isfinite(min(steps)) else None
 
@@ -221,7 +221,7 @@ class Run:
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         if self.history and self.history.too_wide(here, count):
             return False
-        if self.path.stepped_over(trail, here, count, self.integrators.steps, self.integrators.sizes):
+        if self.narrow.stepped_over(trail, here, count, self.integrators.steps, self.integrators.sizes):
             return False
         found = self._crossing(ahead)
         self.done = here + count if found is None else here + found.place
@@ -289,7 +289,7 @@ class Run:
         return bool(np.any(gaps.values < -gaps.noise))
 
     def _watch(self, first: int, last: int) -> bool:
-        """Whether a singular pose between two places was crossed; SolveError, `done` being the last before it, if it was not."""
+        """Whether a singular pose between two places was crossed; else SolveError, with `done` the last before it."""
         if not self.coordinates.conditioning.needed:
             return False
         trail = self.trail

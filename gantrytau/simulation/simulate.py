@@ -64,8 +64,7 @@ def simulate(
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
     exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however short.
-    singular: "stop" with SolveError at a pose where forces are not determined, or "cross" it with the speeds before it, where
-    the motion goes on smoothly: ways to move part there, and continuity of speeds decides. A warning has the times.
+    singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError

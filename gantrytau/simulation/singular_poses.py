@@ -48,7 +48,8 @@ class Look:
     """What was seen at some points, arrays over them.
 
     side: sign of the determinant of the dependent coordinates; distance: smallest singular value of the
-    constraints, relative to the first look on the same side of all events; regular: whether accelerations and forces are determined.
+    constraints, relative to the first look on the same side of all events; regular: whether accelerations and forces are
+    determined.
     """
 
     side: np.ndarray

@@ -7,9 +7,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.translated import Translated
+from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.between.path import Path
 from gantrytau.simulation.trail import Trail
 
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
@@ -92,7 +92,7 @@ def _noise(coordinates: Coordinates, trail: Trail, done: int) -> np.ndarray:
     """
     places = np.unique(np.linspace(0, done, LOOKED_AT).astype(int))
     x, z, t, w = trail.x[places], trail.z[places], trail.t[places, None], trail.rows(places)
-    rates = Path(coordinates).rates
+    rates = NarrowForces(coordinates).rates
     found = []
     for sign in (-2, -1, 0, 1, 2):
         near = 1 + sign * np.finfo(float).eps

@@ -1,7 +1,7 @@
 """What rounding makes of a number: the sum over all operations that lead to it.
 
-Each result is v (1 + e) with |e| <= 2^-53; to first order a number is off by at most 2^-53 times the sum of its derivatives by
-the e of all operations (Wilkinson). It may be large where terms cancel, though the number and what it follows from are small.
+Each result is v (1 + e) with |e| <= 2^-53; to first order a number is off by at most 2^-53 times the sum of its derivatives
+by the e of all operations (Wilkinson). That is much where large terms cancel, however small the number is.
 """
 
 from collections.abc import Sequence

@@ -311,7 +311,7 @@ class Changes:
             tried.append(modes)
             modes = self._led_to(k, modes, errors)
             if np.array_equal(modes, tried[-1]):
-                return
+                return None
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
@@ -320,7 +320,7 @@ class Changes:
                 modes = tried[0].copy()
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors), modes):
-                    return
+                    return None
         before, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried))
         if np.any(
             self._rounded > before

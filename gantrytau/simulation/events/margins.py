@@ -10,8 +10,8 @@ import numpy as np
 
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
-from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.between.rounding import rounding
+from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.singular_poses import Point
 
 JUMP = 1e-6  # of the largest rate or algebraic: less is no jump

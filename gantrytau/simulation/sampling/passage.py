@@ -14,8 +14,8 @@ from gantrytau.simulation.sampling.runge_kutta import TIMES, one_step
 class Passage:
     """The function of a passage: (y, u) -> (y behind it, e3, e5), and the algebraics just before what is due, if any.
 
-    y: states, what is held, discretes, modes; u: time and step, s, the start of the interval in which the step lies, which held
-    variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
+    y: states, what is held, discretes, modes; u: time and step, s, the start of the interval in which the step lies, which
+    held variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
     estimates of the error of the states, divided by the step.
     instructions: of the rates of its stages; by_held: modes that follow from what is held, which change at instants only.
     """

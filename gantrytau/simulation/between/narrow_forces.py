@@ -1,8 +1,8 @@
 """Whether the rates of a motion between its places are what the motion says: forces that are narrow along its path.
 
-An integrator that takes long steps sees the rates at their ends only. Between two places the motion is the cubic by states and
-rates at both; in the middle its rate is held against that of the equations there. What differs by more than the motion allows
-was stepped over, and is integrated again in short steps.
+An integrator that takes long steps sees the rates at their ends only. Between two places the motion is the cubic by states
+and rates at both; in the middle its rate is held against that of the equations there. What differs by more than a share of
+the motion was stepped over, and is integrated again in short steps.
 """
 
 import casadi as ca
@@ -20,7 +20,7 @@ PARTS = 4  # steps at least in an interval in which rates were not seen
 AROUND = 2  # intervals behind such a one
 
 
-class Path:
+class NarrowForces:
     """The intervals of a run in which steps are kept short, `until` a time, s, to `step`, s."""
 
     def __init__(self, coordinates: Coordinates):
@@ -80,7 +80,7 @@ class Path:
 
     @property
     def rates(self) -> ca.Function:
-        """x' as a function of x, z, time, t0, w."""
+        """X' as a function of x, z, time, t0, w."""
         c = self.coordinates
         arguments = [c.x, c.z, time, c.t0, c.w]
         return c.kept("rates", lambda: ca.Function("rates", arguments, [ca.densify(c.ode)], {"cse": True}))
