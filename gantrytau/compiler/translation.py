@@ -156,7 +156,7 @@ def _sorted(
     _refuse_differentiated(flat, reduced, indexed, wanted)
     asked = start_values(flat, reduced, indexed.symbols(reduced.known))
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in asked.values}
-    asked = replace(asked, values={**asked.values, **better})
+    asked = replace(asked, values={**asked.values, **better}, wished=asked.values)
     try:
         sample = consistent_start(flat, reduced, indexed, asked)
     except InitializationError as error:

@@ -85,6 +85,12 @@ class Coordinates:
         return bool(self.sampled or self.held or self.discretes or self.dae.flat.delays or len(self.switches))
 
     @property
+    def curved(self) -> bool:
+        """Whether rates depend on states other than linearly."""
+        moving, unknown = ca.vertcat(self.ode, self.algebraic), ca.vertcat(self.x, self.z)
+        return self.kept("curved", lambda: ca.depends_on(ca.jacobian(moving, unknown), unknown))
+
+    @property
     def delay_columns(self) -> slice:
         """Where the coefficients of delayed values, six of each, stand in what is held."""
         first = len(self.held) + len(self.discretes)
@@ -141,6 +147,7 @@ class Coordinates:
             "max_num_steps": steps,
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
+            "linear_solver": "csparse",  # the QR of CasADi fails by entries whose squares are no numbers
         }
         if longest is not None and np.isfinite(longest):
             options["max_step_size"] = longest
@@ -148,7 +155,6 @@ class Coordinates:
             options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
-            options["linear_solver"] = "csparse"
             if size > 1:
                 options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps

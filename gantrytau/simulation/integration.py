@@ -8,13 +8,15 @@ from gantrytau.errors import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
+from gantrytau.simulation.between.across import across, lay, left_at
+from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
 from gantrytau.simulation.events.margins import ROUNDING, Margins
 from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.integrators import Integrators
+from gantrytau.simulation.integrators import MOST_STEPS, WALKED_STEPS, Integrators
 from gantrytau.simulation.memory.past_values import PastValues
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
@@ -24,8 +26,10 @@ from gantrytau.simulation.trail import LEAST_STEPS, Trail
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
 REST = 10.0  # times the tolerance: what may be left of a margin
+PARTS = 4  # of a smooth run: in each the integrator starts anew, in steps of first order
 GROWTH = 10  # of a stretch in which nothing has switched
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
+SOMETIMES = 0.1  # the same, where it starts anew at events
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 
@@ -40,8 +44,9 @@ class Run:
         grid: np.ndarray,
         tolerance: float,
         longest: float | None = None,
+        crosses: bool = False,
     ):
-        """tolerance: of one step; longest: step of the integrator, s."""
+        """tolerance: of one step; longest: step of the integrator, s; crosses: whether it crosses singular poses."""
         self.coordinates = coordinates
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
@@ -49,10 +54,16 @@ class Run:
             longest = min(longest or np.inf, self.span / LEAST_STEPS)
         self.pulses = pulses(coordinates.of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
+        self.narrow = NarrowForces(coordinates)
         interval = float(np.diff(self.trail.t).max())
         often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
-        exact = max(OFTEN * tolerance, min(LEAST, tolerance)) if often else tolerance
+        own = OFTEN if often else SOMETIMES if len(coordinates.switches) or coordinates.rounds.whens else 1.0
+        exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
+        self.crosses, self.crossed = crosses, list[float]()  # times, s
+        self.integrators.most = (
+            WALKED_STEPS if crosses else MOST_STEPS
+        )  # soon given up where a pose stands in the way
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -81,10 +92,6 @@ class Run:
         """Why it ended: "stop", or what a when said."""
         return self.changes.ended or "stop"
 
-    def largest(self) -> np.ndarray:
-        """The largest absolute value of each state so far."""
-        return np.abs(self.trail.x[: self.done + 1]).max(axis=0)
-
     def go(self) -> None:
         trail = self.trail
         self.done = self.changes.begin()
@@ -106,7 +113,11 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if count == 1 and not self._nearer():
+                    if (
+                        count == 1
+                        and not self._nearer()
+                        and not (self.crosses and self._across(self._approach()))
+                    ):
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
@@ -137,13 +148,18 @@ class Run:
             self.done = self.changes.behind_inputs(self.done)
             self.changes.renew(self.done)
         if self.sampler.leaves_switches:
+            self.changes.was_sampled(self.done)
             self.done = self.changes.turn(self.done)
         return True
 
     def _shorter(self) -> float | None:
-        """The longest step of what lies ahead, s, where a function of time changes after it was at rest."""
+        """The longest step of what lies ahead, s, where a function of time changes after it was at rest, or forces are
+        narrow along the path.
+        """
         t = self.trail.t[self.done : self.done + 2]
-        return self.pulses.step if self.pulses.within(float(t.sum()) / 2) else None
+        steps = [self.narrow.longest(float(t[0]))]
+        steps += [self.pulses.step] if self.pulses.within(float(t.sum()) / 2) else []
+        return min(steps) if np.isfinite(min(steps)) else None
 
     def _hold_together(self, places: np.ndarray) -> None:
         """SolveError if constraints that were left out as redundant no longer hold at places."""
@@ -160,7 +176,7 @@ class Run:
             return min(CHUNK, last)
         if len(coordinates.switches):
             return CHUNK * GROWTH
-        return min(last, max(CHUNK, last // 50))
+        return max(CHUNK, last // PARTS)
 
     def _nearer(self) -> bool:
         """Whether something is about to switch where the integration fails: then the next place is laid nearer.
@@ -215,12 +231,15 @@ class Run:
         trail.z[reached] = self.coordinates.settle(trail.x[reached], z, trail.t[reached], inputs)
         if self.history and self.history.too_wide(here, count):
             return False
+        if self.narrow.stepped_over(trail, here, count, self.integrators.steps, self.integrators.sizes):
+            return False
         gaps = self._gaps(ahead)
         found = None if gaps is None else first_crossing(trail.t[ahead], gaps)
         if gaps is not None and self.looks.by_margins(ahead, gaps, found):
             return False
         self.done = here + count if found is None else here + found.place
-        self._watch(here, self.done)
+        if self._watch(here, self.done):
+            return False
         self._hold_together(reached)
         return found is not None and self._cross(found)
 
@@ -265,10 +284,10 @@ class Run:
         self.done = k + 1
         return bool(turned)
 
-    def _watch(self, first: int, last: int) -> None:
-        """SolveError if a singular pose lies between two places; `done` is then the last before it."""
+    def _watch(self, first: int, last: int) -> bool:
+        """Whether a singular pose between two places was crossed; else SolveError, with `done` the last before it."""
         if not self.coordinates.conditioning.needed:
-            return
+            return False
         trail = self.trail
         first = max(first - 1, 0)  # the rise behind a pose may show in the next stretch only
         places = np.arange(first, last + 1)
@@ -276,25 +295,49 @@ class Run:
         times = np.arange(float(trail.t[places[0]]), float(trail.t[last]), self.span / LEAST_STEPS)
         some = places[np.unique(np.append(np.searchsorted(trail.t[places[:-1]], times), places.size - 1))]
         if 2 * some.size < places.size and not self._doubts(some).any():
-            return
+            return False
         for k in places[:-1][self._doubts(places)]:
             if k <= self.seen:
                 continue
             self.done = self.seen = int(k)
             found = self._approach()
             if found.singular or (not found.arrived and self._weakest(found.point)):
-                raise self._singular_pose(found)
+                if not self._across(found):
+                    raise self._singular_pose(found)
+                return True
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
+        return False
+
+    def _across(self, found: Approach) -> bool:
+        """Whether a singular pose is crossed, if it may be: `done` is then behind it."""
+        begin = int(np.searchsorted(self.trail.t[: self.done + 1], left_at(found))) - 1
+        way = (
+            across(found, self.changes.point(begin), self.integrators)
+            if self.crosses and begin >= 0
+            else None
+        )
+        if way is None:
+            return False
+        self.done = self.seen = lay(self.trail, begin, *way)
+        self.crossed.append(found.zero)
+        return True
 
     def _doubts(self, places: np.ndarray) -> np.ndarray:
         """Whether a singular pose may lie between successive places."""
-        return doubtful(self.trail.t[places], self._look(*self.changes.columns(places)))
+        columns = self.changes.columns(places)
+        look = self._look(*columns)
+        sides = self.coordinates.conditioning.sides(columns[-1])
+        alike = np.all(sides[1:] == sides[:-1], axis=1)  # else there is no measure in common
+        return doubtful(columns[2], look) & (alike | look.near[1:])
 
     def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
         return self.coordinates.conditioning.look(x, z, t[:, None], t[:, None], w)
 
     def _weakest(self, point: Point) -> list[str]:
-        return self.coordinates.weakest(point, self.changes.point(0))
+        """What degenerates at a point, though it was sound behind the last event."""
+        sides = self.coordinates.conditioning.sides(self.trail.rows(np.arange(self.done + 1)))
+        turned = np.flatnonzero(np.any(sides[1:] != sides[:-1], axis=1))
+        return self.coordinates.weakest(point, self.changes.point(int(turned[-1]) + 1 if turned.size else 0))
 
     def _singular_pose(self, found: Approach) -> SolveError:
         return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))

@@ -21,7 +21,8 @@ WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it en
 class Integrators:
     """Integrators over some numbers of intervals, made when they are needed.
 
-    size: of algebraics, below which their errors do not count; by_modes: whether each choice of modes has its own.
+    size: of algebraics, below which their errors do not count; by_modes: whether each choice of modes has its own;
+    most: steps to one end.
     """
 
     def __init__(self, coordinates: Coordinates, tolerance: float, longest: float | None, interval: float):
@@ -32,6 +33,7 @@ class Integrators:
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
+        self.most = MOST_STEPS
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -42,7 +44,7 @@ class Integrators:
         """
         count = len(t) - 1
         p = [t[0], t[1] - t[0]] if courses is None else []
-        return self._integrate(count, MOST_STEPS, x, z, p, [] if courses is None else courses)
+        return self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
 
     def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
         """The point a step later, in s; RuntimeError or SolveError where there is none."""

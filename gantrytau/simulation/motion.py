@@ -43,14 +43,9 @@ def all_coordinates(
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
     moving = [rates, column(solved.residuals), column(pieces.conditions), *levels]
-    wanted = [
-        *moving,
-        ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
-        dae.openings,
-        dae.to_reduced(column([s.expression for s in dae.flat.sampled])),
-        *_matrices(solved),
-    ]
-    found = substitution.inserted(wanted)
+    slopes = ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values()))))
+    renewal = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
+    found = substitution.inserted([*moving, slopes, dae.openings, renewal, *_matrices(solved)])
     turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
     ode, algebraic, conditions, *rest = outside.inserted(found)
     invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
@@ -58,6 +53,8 @@ def all_coordinates(
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)
     divisors = _divisors(solved, pivots, list(last), list(highest))
+    at_events = _at_events(dae, len(sampled), w, len(turns))
+    constraints = _constraints(dae, invariants, states)
     return Coordinates(
         dae=dae,
         states=states,
@@ -80,8 +77,14 @@ def all_coordinates(
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
+        conditioning=Conditioning(*constraints, divisors, matrices, arguments, at_events),
     )
+
+
+def _at_events(dae: Translated, sampled: int, w: ca.SX, switches: int) -> list[int]:
+    """Which of the inputs w change at events only: Discretes, and modes, which stand last."""
+    first = 2 * sampled + len(dae.flat.sampled)
+    return [*range(first, first + len(dae.flat.discretes)), *range(w.numel() - switches, w.numel())]
 
 
 def _states(dae: Translated, follow: Collection[str]) -> tuple[str, ...]:

@@ -41,7 +41,8 @@ def singular_pose(dae: Translated, t: float, weakest: Sequence[str]) -> SolveErr
     return SolveError(
         f"{dae.name}: the motion meets a singular pose at t = {t:.6g} s, where forces or "
         f"accelerations are not determined. The equations that degenerate there: {'; '.join(weakest)}. .result "
-        f"holds the motion up to there: keep away from that pose, or change the geometry{doubt}",
+        "holds the motion up to there: keep away from that pose, change the geometry, or, where the motion goes on "
+        f"smoothly, cross it with the speeds before it, simulate(..., singular='cross'){doubt}",
         time=t,
         equations=weakest,
     )

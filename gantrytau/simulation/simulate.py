@@ -48,6 +48,7 @@ def simulate(
     max_step: float | None = None,
     seed: int | None = None,
     limits: Literal["warn", "stop"] | None = "warn",
+    singular: Literal["stop", "cross"] = "stop",
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
@@ -68,6 +69,7 @@ def simulate(
     it turns: places are laid by the rates of what it depends on.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
+    singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
@@ -75,7 +77,8 @@ def simulate(
     that are not finite although the states are, and of limits that are passed.
     """
     _check(start, stop, tolerance, points, max_step)
-    _check_word(limits)
+    _check_word("limits", limits, ("warn", "stop", None))
+    _check_word("singular", singular, ("stop", "cross"))
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -89,7 +92,7 @@ def simulate(
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)
     _check_inputs(dae, signals)
     grid = np.linspace(start, stop, points)
-    result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs)
+    result = _all_runs(dae, signals, wanted, grid, tolerance, max_step, outputs, singular == "cross")
     for doubt in (doubts(result), passed(dae, result) if limits == "warn" else ""):
         if doubt:
             warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
@@ -104,14 +107,19 @@ def _all_runs(
     tolerance: float,
     max_step: float | None,
     outputs: Sequence[str] | None,
+    crosses: bool,
 ) -> Result:
     """One run over a grid, or several where constraints that repeat others are chosen anew; SolveError with the result so
     far where it stops before its end.
     """
     parts: list[Result] = []
+    crossed: list[float] = []
     left = grid
     while True:
-        run, error = _sized_run(_coordinates(dae, signals, wanted), signals, left, tolerance, max_step)
+        run, error = _sized_run(
+            _coordinates(dae, signals, wanted), signals, left, tolerance, max_step, crosses
+        )
+        crossed += run.crossed
         ended = run.ended if error is None else str(error) or "interrupted"
         parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended, run.instants()))
         found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
@@ -119,6 +127,14 @@ def _all_runs(
             break
         left, dae = found
     result = joined(parts, grid)
+    if crossed:
+        times = ", ".join(f"{t:.6g}" for t in crossed)
+        warnings.warn(
+            f"{dae.name}: singular poses were crossed with the speeds before them at t = {times} s; forces are not "
+            "determined there",
+            DoubtfulResult,
+            stacklevel=3,
+        )
     if isinstance(error, SolveError):
         error.result = result
         raise error
@@ -145,17 +161,18 @@ def _sized_run(
     grid: np.ndarray,
     tolerance: float,
     max_step: float | None,
+    crosses: bool,
 ) -> tuple[Run, SolveError | KeyboardInterrupt | None]:
     """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
     coordinates = coordinates.sized(first_sizes(coordinates))
     left = ROUNDS
     while True:
-        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step)
+        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step, crosses)
         try:
             run.go()
         except (SolveError, KeyboardInterrupt) as error:
             return run, error
-        sizes = seen_sizes(coordinates, run.largest()) if left else None
+        sizes = seen_sizes(coordinates, run.trail, run.done, MARGIN * tolerance) if left else None
         if sizes is None:
             return run, None
         coordinates, left = coordinates.sized(sizes), left - 1
@@ -183,10 +200,10 @@ def _check(start: float, stop: float, tolerance: float, points: int, max_step: f
         )
 
 
-def _check_word(limits: object) -> None:
-    if limits not in ("warn", "stop", None):
+def _check_word(argument: str, found: object, words: Sequence[str | None]) -> None:
+    if found not in words:
         raise ModelError(
-            f"simulate: found limits={limits!r}, expected 'warn', 'stop' or None", argument="limits"
+            f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}", argument=argument
         )
 
 

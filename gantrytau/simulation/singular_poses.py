@@ -37,7 +37,10 @@ SHORTEST = 2.0**-14  # step, of the interval, to come near to where the integrat
 SURPRISE = 0.25  # of the distance, by which it may miss what its fall had led to expect
 MOST = 400  # steps; past a pose that is not met a motion needs about twenty
 
+NOTHING = 1e-9  # of the largest, below which a row or a column counts as zero
+
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # states, algebraics, time, sampled inputs
+Scale = tuple[np.ndarray, np.ndarray, float]  # lengths of rows and columns, and the smallest singular value
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,8 @@ class Look:
     """What was seen at some points, arrays over them.
 
     side: sign of the determinant of the dependent coordinates; distance: smallest singular value of the
-    constraints, relative to the first look; regular: whether accelerations and forces are determined.
+    constraints, relative to the first look on the same side of all events; regular: whether accelerations and forces are
+    determined.
     """
 
     side: np.ndarray
@@ -62,7 +66,8 @@ class Conditioning:
     """Constraint Jacobian and matrices of the blocks as functions of the point.
 
     constraints: Jacobian by the coordinates, of which `dependent` are the columns of the dependent ones;
-    divisors, matrices: of the blocks; what never changes is left out. arguments: symbols of a point.
+    divisors, matrices: of the blocks; what never changes is left out. arguments: symbols of a point; steps: columns of
+    its inputs that change at events only: behind one that the matrices depend on they are measured anew.
     """
 
     def __init__(
@@ -72,6 +77,7 @@ class Conditioning:
         divisors: Sequence[ca.SX],
         matrices: Sequence[ca.SX],
         arguments: Sequence[ca.SX],
+        steps: Sequence[int] = (),
     ):
         heads = [d for d in divisors if not d.is_constant()]
         changing = [ca.densify(m) for m in matrices if not m.is_constant()]
@@ -83,12 +89,13 @@ class Conditioning:
         parts = [ca.densify(constraints), *changing]
         everything = ca.vertcat(*heads, *(ca.vec(m) for m in parts))
         self._function = ca.Function("conditioning", list(arguments), [ca.densify(everything)], {"cse": True})
-        self._scales: list[tuple[np.ndarray, np.ndarray, float]] = []
+        self._steps = [k for k in steps if ca.depends_on(everything, arguments[-1][k])]
+        self._scales: dict[bytes, list[Scale]] = {}
 
     def anew(self) -> "Conditioning":
-        """The same for another run, which measures by its own start."""
+        """The same for another run, which measures by its own places."""
         found = copy(self)
-        found._scales = []
+        found._scales = {}
         return found
 
     @property
@@ -96,8 +103,23 @@ class Conditioning:
         """Whether anything changes at all."""
         return self._function.numel_out(0) > 0
 
+    def sides(self, w: np.ndarray) -> np.ndarray:
+        """What tells the sides of events apart by which matrices are measured, (points, k), of inputs (points, m)."""
+        return w[:, self._steps]
+
     def look(self, *points: np.ndarray) -> Look:
         """What is to be seen at points, given by the arguments with one row per point."""
+        sides = self.sides(points[-1])
+        if np.all(sides[:1] == sides):
+            return self._look(sides[0], *points)
+        sides, own = np.unique(sides, axis=0, return_inverse=True)
+        found = [self._look(side, *(p[own.ravel() == k] for p in points)) for k, side in enumerate(sides)]
+        order = np.argsort(np.argsort(own.ravel(), kind="stable"), kind="stable")
+        parts = zip(*((one.side, one.distance, one.regular) for one in found), strict=True)
+        return Look(*(np.concatenate(part)[order] for part in parts))
+
+    def _look(self, side: np.ndarray, *points: np.ndarray) -> Look:
+        """The same on one side of all events; the first point there is the measure."""
         (values,) = at_places(self._function, *points)
         matrices, place = [], self._divisors
         for rows, columns in self._shapes:
@@ -105,23 +127,20 @@ class Conditioning:
             matrices.append(part.reshape(len(values), columns, rows).transpose(0, 2, 1))
             place += rows * columns
         constraints, *blocks = [np.nan_to_num(m, nan=0.0, posinf=0.0, neginf=0.0) for m in matrices]
-        if not self._scales:
-            self._scales = [_scale(m[0]) for m in (constraints, *blocks)]
-        distances = [_least(m, scale) for m, scale in zip((constraints, *blocks), self._scales, strict=True)]
-        side = np.ones(len(values))
+        scales = self._scales.setdefault(side.tobytes(), [])
+        scales += [_scale(m[0]) for m in (constraints, *blocks)] if not scales else []
+        distances = [_least(m, scale) for m, scale in zip((constraints, *blocks), scales, strict=True)]
+        sign = np.ones(len(values))
         if self._dependent:
-            rows, columns, _ = self._scales[0]
-            side = np.linalg.slogdet((constraints / rows / columns)[:, :, self._dependent])[0]
+            rows, columns, _ = scales[0]
+            sign = np.linalg.slogdet((constraints / rows / columns)[:, :, self._dependent])[0]
         regular = np.all([d > LEAST for d in distances[1:]], axis=0) if blocks else np.ones(len(values), bool)
-        return Look(side, distances[0], regular)
+        return Look(sign, distances[0], regular)
 
 
-def _scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _scale(matrix: np.ndarray) -> Scale:
     """Lengths of rows and columns, and the smallest singular value of the matrix divided by them."""
-    own_rows, own_columns = balance(matrix)
-    sized = own_rows * matrix * own_columns
-    rows = np.maximum(np.linalg.norm(sized, axis=1, keepdims=True), 1e-300) / own_rows
-    columns = np.maximum(np.linalg.norm(matrix / rows, axis=0, keepdims=True), 1e-300)
+    rows, columns = _lengths(matrix)
     if matrix.size == 0:
         return rows, columns, 1.0
     least = np.linalg.svd(matrix / rows / columns, compute_uv=False)[-1]
@@ -129,7 +148,18 @@ def _scale(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return rows, columns, max(float(least), SOUND)
 
 
-def _least(matrices: np.ndarray, scale: tuple[np.ndarray, np.ndarray, float]) -> np.ndarray:
+def _lengths(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths of rows (m, 1) and columns (1, n); one that is zero here need not be so elsewhere: it is as long as others."""
+    own_rows, own_columns = balance(matrix)
+    sized = own_rows * matrix * own_columns
+    rows = np.linalg.norm(sized, axis=1, keepdims=True)
+    rows = np.where(rows > NOTHING * rows.max(initial=0.0), rows, 1.0)
+    columns = np.linalg.norm(sized / rows, axis=0, keepdims=True)
+    columns = np.where(columns > NOTHING * columns.max(initial=0.0), columns, 1.0)
+    return rows / own_rows, columns / own_columns
+
+
+def _least(matrices: np.ndarray, scale: Scale) -> np.ndarray:
     """Smallest singular values, relative to that of the scale."""
     rows, columns, size = scale
     if matrices[0].size == 0:
@@ -210,8 +240,7 @@ def depending(here: np.ndarray, before: np.ndarray, names: Sequence[str]) -> lis
     """Rows of a matrix that nearly depend on each other here, while before they did not."""
     if not (here.size and np.all(np.isfinite(here)) and np.all(np.isfinite(before))):
         return []
-    rows = np.maximum(np.linalg.norm(before, axis=1, keepdims=True), 1e-300)
-    columns = np.maximum(np.linalg.norm(before / rows, axis=0, keepdims=True), 1e-300)
+    rows, columns = _lengths(before)
     left, values, _ = np.linalg.svd(here / rows / columns)
     if values[-1] > LOST * np.linalg.svd(before / rows / columns, compute_uv=False)[-1]:
         return []

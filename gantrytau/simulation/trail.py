@@ -37,6 +37,7 @@ class Trail:
         self._rooms: dict[str, np.ndarray] = {}  # of the rows, with some to spare
         self._past, past = coordinates.delay_columns, len(coordinates.dae.flat.delays) > 0
         watched = coordinates.conditioning.needed or len(coordinates.switches) or len(spans) or past
+        watched = watched or coordinates.curved
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
         periods = np.array([table.number(s.period) for s in events])

@@ -47,7 +47,7 @@ def test_nothing_is_said_of_limits_that_are_kept_or_not_looked_at(model, limits)
 
 
 def test_another_word_for_limits_is_refused():
-    with pytest.raises(ModelError, match="found limits='end', expected 'warn', 'stop' or None") as error:
+    with pytest.raises(ModelError, match="found limits='end', expected 'warn' or 'stop' or None") as error:
         simulate(Throw(), stop=1.0, limits="end")  # pyright: ignore[reportArgumentType]
     assert error.value.argument == "limits"
 

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, Start, der, if_else, simulate
+from gantrytau import Input, Model, Parameter, Real, Start, cos, der, if_else, simulate, sin, time, translate
+from gantrytau.simulation.motion import all_coordinates
+from gantrytau.simulation.state_sizes import first_sizes
 from gantrytau_models import Pendulum
 
 NEAR = 1e-5  # of the amplitude: a thousand times the tolerance, over sixteen periods
@@ -77,3 +79,42 @@ def test_what_is_given_small_among_large_states_counts():
 
     found = simulate(Mixed(), stop=3.0)
     np.testing.assert_allclose(found["small"] / 1e-9, np.exp(np.exp(-found.time) - 1), rtol=1e-6)
+
+
+def test_a_load_that_hangs_still_is_not_followed_into_its_rounding():
+    class Slewed(Model):
+        """A load below a jib that turns: at rest, whatever rounding makes of the sum of its forces."""
+
+        phi = Real(start=0.0, fixed=True)
+        w = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            x, y = 1.4 * cos(time), 1.4 * sin(time)
+            rounding = x * sin(time) - y * cos(time)
+            yield der(self.phi) == self.w
+            yield der(self.w) == -18.62 * sin(self.phi) + rounding
+
+    found = simulate(Slewed(), stop=3.0)
+    assert np.abs(found["w"]).max() < 1e-14  # ten times the rounding of the forces, over the run
+
+
+@pytest.mark.parametrize("beside", [0.0, math.cos(math.pi / 2)])
+def test_a_start_that_is_rounding_is_no_size(beside):
+    class Chain(Model):
+        """Oscillators of frequency 2 that are coupled, of which the second starts at zero, or at the cosine of pi/2."""
+
+        x = Real(start=1.0, fixed=True)
+        v = Real(start=0.0, fixed=True)
+        y = Real(start=beside, fixed=True)
+        u = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == self.v
+            yield der(self.v) == -4 * self.x
+            yield der(self.y) == self.u
+            yield der(self.u) == -4 * self.y + self.x
+
+    dae = translate(Chain())
+    found = simulate(dae, stop=5.0)
+    np.testing.assert_allclose(found["y"], found.time * np.sin(2 * found.time) / 4, rtol=0, atol=1e-6)
+    assert first_sizes(all_coordinates(dae, {})) == (1.0,) * 4

@@ -17,12 +17,14 @@ class StartValues:
     """Numbers of all symbols before they are consistent; started: given by somebody; fixed: must hold.
 
     chosen: of the started those that whoever uses the model gave, not its author: they are kept before the others.
+    wished: values as they were given, where others are nearer to what is consistent.
     """
 
     values: Mapping[str, float]
     started: frozenset[str]
     fixed: frozenset[str]
     chosen: frozenset[str] = frozenset()
+    wished: Mapping[str, float] | None = None
 
 
 def start_values(flat: FlatModel, reduced: Reduced, symbols: list[str]) -> StartValues:

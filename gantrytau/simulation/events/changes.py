@@ -43,6 +43,7 @@ class Changes:
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
         self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
+        self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self.ended = ""  # what a when said that ended the run
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -66,7 +67,7 @@ class Changes:
 
     def margins(self, places: np.ndarray) -> Margins:
         """The margins at places."""
-        return self.coordinates.switches.look(*self.columns(places), self.sizes)
+        return self.coordinates.switches.look(*self.columns(places), self.sizes).blurred(self._rounded)
 
     def conditions(self, switches: np.ndarray) -> list[str]:
         """What some switches ask for, in the model's words."""
@@ -110,6 +111,15 @@ class Changes:
                 raise run_ends.sampled_badly(self.coordinates.dae, t, name)
         trail.held[k, : due.size][due] = new[due]
         trail.z[k] = self._settled(k)
+
+    def was_sampled(self, k: int) -> None:
+        """Keep what was at a place before its variables got their new values, for whens that act there."""
+        trail = self.trail
+        if not (self._holding.size and trail.due[k].any() and k > 0):
+            return
+        held, trail.held[k] = trail.held[k].copy(), trail.held[k - 1]
+        self._unsampled = k, trail.held[k].copy(), self._settled(k)
+        trail.held[k] = held
 
     def behind_inputs(self, k: int) -> int:
         """From the place before a jump of inputs to that behind it, which is returned."""
@@ -306,7 +316,7 @@ class Changes:
             tried.append(modes)
             modes = self._led_to(k, modes, errors)
             if np.array_equal(modes, tried[-1]):
-                return
+                return None
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
@@ -315,8 +325,22 @@ class Changes:
                 modes = tried[0].copy()
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors), modes):
-                    return
+                    return None
+        before, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried))
+        if np.any(
+            self._rounded > before
+        ):  # margins may follow from large numbers that cancel: then rates decide
+            return self._agree(k, tried[1], errors)
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
+
+    def _rounding(self, k: int, tried: Sequence[np.ndarray]) -> np.ndarray:
+        """What rounding makes of the margins of a place, (switches,), the most in some modes."""
+        found = []
+        for modes in tried:
+            self._led_to(k, modes, 0.0)
+            found.append(self.coordinates.switches.rounding(self.point(k)))
+        self.modes(k)[:] = tried[0]
+        return np.max(found, axis=0)
 
     def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float) -> np.ndarray:
         """The modes that belong to the margins of a place that has these modes."""

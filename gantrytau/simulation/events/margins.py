@@ -3,16 +3,19 @@
 import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.language.piecewise import Turn
 from gantrytau.language.symbols import time
+from gantrytau.simulation.between.rounding import rounding
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.singular_poses import Point
 
 JUMP = 1e-6  # of the largest rate or algebraic: less is no jump
+ALGEBRAICS = 8  # times rounding, to which they solve their equations
 ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
 
 
@@ -70,6 +73,7 @@ class Switches:
         dense = [ca.densify(e) for e in found]
         self._moves = AtPlaces(ca.Function("moves", list(arguments), [ca.densify(ode)]))
         self._slopes = ca.Function("slopes", list(arguments), [ca.densify(by_x)])
+        self._exact = list(arguments), margins, algebraic
         self._look = AtPlaces(ca.Function("margins", [*arguments, self._size], dense, {"cse": True}))
 
     def __len__(self) -> int:
@@ -92,6 +96,21 @@ class Switches:
         rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
         return Margins(values, rates, noise)
+
+    @cached_property
+    def _rounding(self) -> ca.Function:
+        arguments, margins, algebraic = self._exact
+        return rounding(arguments, ca.vertcat(margins, algebraic))
+
+    def rounding(self, point: Point) -> np.ndarray:
+        """What rounding makes of the margins at a point, by all that leads to them, (switches,)."""
+        x, z, t, w = point
+        own, inner = np.split(np.nan_to_num(np.array(self._rounding(x, z, t, t, w)).ravel()), [len(self)])
+        if self._of_algebraics:
+            found = self._look(x[None], z[None], t, t, w[None], 1.0)
+            by_z, jacobian = (found[k].reshape(z.size, -1).T for k in (3, 4))
+            own += np.abs(by_z @ np.linalg.pinv(np.nan_to_num(jacobian))) @ inner
+        return ALGEBRAICS * own
 
     def jumped(self, before: Point, after: Point) -> bool:
         """Whether rates or algebraics differ at two places of one instant; at a kink they do not."""

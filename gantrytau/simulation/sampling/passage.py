@@ -14,8 +14,8 @@ from gantrytau.simulation.sampling.runge_kutta import TIMES, one_step
 class Passage:
     """The function of a passage: (y, u) -> (y behind it, e3, e5), and the algebraics just before what is due, if any.
 
-    y: states, what is held, modes; u: time and step, s, the start of the interval in which the step lies, which held
-    variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
+    y: states, what is held, discretes, modes; u: time and step, s, the start of the interval in which the step lies, which
+    held variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
     estimates of the error of the states, divided by the step.
     instructions: of the rates of its stages; by_held: modes that follow from what is held, which change at instants only.
     """
@@ -26,10 +26,10 @@ class Passage:
 
 
 def passage(coordinates: Coordinates) -> Passage:
-    """The passage of a model whose algebraic unknowns, if any, follow from linear equations."""
+    """The passage of a model whose algebraic unknowns, if any, follow from linear equations; no when acts in it."""
     sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
     x = ca.MX.sym("x", len(coordinates.states))
-    own = ca.MX.sym("held", held + len(coordinates.switches))
+    own = ca.MX.sym("held", coordinates.w.numel() - sampled)
     t, h, begin = (ca.MX.sym(name) for name in ("t", "h", "begin"))
     due = ca.MX.sym("due", held)
     inputs, later = ca.MX.sym("inputs", sampled), ca.MX.sym("later", sampled)
@@ -82,6 +82,7 @@ class Equations:
 def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
     """(x, z, t, w, due) -> what is held, and the modes, from t on."""
     sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
+    modes = coordinates.w.numel() - len(coordinates.switches)
     due = ca.SX.sym("due", held)
     w = coordinates.w
     (renewed,) = ca.substitute([ca.densify(coordinates.renewal)], [coordinates.t0], [time])
@@ -89,19 +90,20 @@ def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
     known = ca.vertcat(known, w[sampled + held :, :])
     for k in by_held:
         (mode,) = ca.substitute([coordinates.switches.turns[k].value], [w], [known])
-        known[sampled + held + k] = mode
+        known[modes + k] = mode
     own = ca.densify(known[sampled:, :])
     return ca.Function("renewal", [coordinates.x, coordinates.z, time, w, due], [own], {"cse": True})
 
 
 def _following_held(coordinates: Coordinates) -> tuple[int, ...]:
-    """The turns whose margins depend on what is held, and on modes of the same kind, alone."""
-    sampled, held = 2 * len(coordinates.sampled), len(coordinates.held)
+    """The turns whose margins depend on what is held, and on modes of the same kind, alone, and that no when asks for."""
+    sampled, modes = 2 * len(coordinates.sampled), coordinates.w.numel() - len(coordinates.switches)
     moving = ca.vertcat(coordinates.x, coordinates.z, time, coordinates.t0, coordinates.w[:sampled, :])
+    asked = {k for own in coordinates.rounds.of for k in own}
     found: list[int] = []
     for k, turn in enumerate(coordinates.switches.turns):
         before = [m for m in range(len(coordinates.switches)) if m not in found]
-        others = ca.vertcat(moving, *(coordinates.w[sampled + held + m] for m in before))
-        if not ca.depends_on(turn.margin, others):
+        others = ca.vertcat(moving, *(coordinates.w[modes + m] for m in before))
+        if k not in asked and not ca.depends_on(turn.margin, others):
             found.append(k)
     return tuple(found)

@@ -39,11 +39,11 @@ class Sampler:
 
     @property
     def suits(self) -> bool:
-        """Whether the model can go this way: it samples, or is given samples, and has no whens, delays or unknowns that are
-        iterated.
+        """Whether the model can go this way: it samples, or is given samples, and has no friction that sticks, delays or
+        unknowns that are iterated.
         """
         c = self.coordinates
-        if not (c.held or c.sampled) or not c.states or c.rounds.whens or c.dae.flat.delays:
+        if not (c.held or c.sampled) or not c.states or c.dae.flat.slips or c.dae.flat.delays:
             return False
         # from few corners to the next an integrator is quicker than steps that solve systems of equations
         if c.algebraics and not (c.held and c.kept("linear", lambda: linear(c))):
@@ -52,7 +52,7 @@ class Sampler:
         timed = ca.vertcat(
             *(turn.margin for turn, by_time in zip(switches.turns, switches.timed, strict=True) if by_time)
         )
-        changing = c.w[: half + len(c.held), :]
+        changing = c.w[: half + len(c.held) + len(c.discretes), :]
         return not (timed.numel() and ca.depends_on(ca.SX(timed), changing))
 
     def over(self, trail: Trail, here: int, shorter: float | None) -> int:
@@ -81,8 +81,8 @@ class Sampler:
 
     @property
     def leaves_switches(self) -> bool:
-        """Whether anything switches that does not follow what is held: that is not seen to here."""
-        return bool(self._live.any())
+        """Whether anything switches, or a when asks, that does not follow what is held: that is not seen to here."""
+        return bool(self._live.any() or self.coordinates.rounds.whens)
 
     @property
     def _live(self) -> np.ndarray:
@@ -184,23 +184,19 @@ class Sampler:
     def _first_turn(self, found: StepsTaken, told: np.ndarray, count: int) -> int | None:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
         c = self.coordinates
-        switches, n, m, half = c.switches, len(c.states), len(c.held), len(c.sampled)
+        switches, n, half = c.switches, len(c.states), len(c.sampled)
+        m, discretes = len(c.held), len(c.discretes)
         live = self._live
         if not live.any() or not count:
             return None
-        t, h, begin = (told[:count, k] for k in range(3))
-        values, slopes = told[:count, 3 + m : 3 + m + half], told[:count, 3 + m + half : 3 + m + 2 * half]
-        own, z = found.before[:count, n:], found.algebraics[:count]
-
-        def gaps(x: np.ndarray, at: np.ndarray) -> Margins:
-            w = np.hstack([values + slopes * (at - begin)[:, None], slopes, own])
-            return switches.gaps(switches.look(x, c.settle(x, z, at, w), at, w, self.sizes), own[:, m:])
-
-        near, far = gaps(found.before[:count, :n], t), gaps(found.after[:count, :n], t + h)
+        # before and behind each step, one after another
+        at = np.stack([told[:count, 0], told[:count, 0] + told[:count, 1]], axis=1).ravel()
+        x = np.stack([found.before[:count, :n], found.after[:count, :n]], axis=1).reshape(2 * count, n)
+        row, own, z = (np.repeat(a[:count], 2, axis=0) for a in (told, found.before[:, n:], found.algebraics))
+        values, slopes = row[:, 3 + m : 3 + m + half], row[:, 3 + m + half : 3 + m + 2 * half]
+        w = np.hstack([values + slopes * (at - row[:, 2])[:, None], slopes, own])
+        margins = switches.look(x, c.settle(x, z, at, w), at, w, self.sizes)
+        gaps = switches.gaps(margins, own[:, m + discretes :])
         chosen = np.concatenate([live, live[[turn.counts for turn in switches.turns]]])
-        both = [
-            np.stack([a, b], axis=1).reshape(2 * count, -1)[:, chosen]
-            for a, b in ((near.values, far.values), (near.rates, far.rates), (near.noise, far.noise))
-        ]
-        first = first_crossing(np.stack([t, t + h], axis=1).ravel(), Margins(*both))
+        first = first_crossing(at, Margins(*(a[:, chosen] for a in (gaps.values, gaps.rates, gaps.noise))))
         return None if first is None else (first.place + 1) // 2

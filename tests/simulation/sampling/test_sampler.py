@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from gantrytau import (
+    Discrete,
     Input,
     Model,
     Parameter,
@@ -17,10 +18,14 @@ from gantrytau import (
     der,
     fabs,
     if_else,
+    pre,
+    reinit,
     sampled,
     simulate,
     sin,
+    time,
     translate,
+    when,
 )
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.sampling.buffers import Buffer
@@ -264,3 +269,53 @@ def test_linear_algebraics_are_solved_within_the_steps(monkeypatch):
     coordinates = all_coordinates(translate(BrakedSixLinks(), events=True), {})
     assert coordinates.algebraics
     assert linear(coordinates)
+
+
+class Counted(Model):
+    """A sampled loop with whens on a state, on what is sampled, and on the time."""
+
+    a = Real(start=0.0)
+    x = Real(start=0.0, fixed=True)
+    level = Discrete(1.0)
+    crossed = Discrete(0)
+    at = Discrete(0.0)
+    full = Discrete(0)
+
+    def equations(self):
+        yield der(self.x) == -self.x + self.a
+        yield sampled(self.a, if_else(self.x > 0.7, 0.0, self.level) + 0.1 * self.a, period=0.01)
+        yield when(self.x >= 0.5, self.crossed == pre(self.crossed) + 1, self.at == time)
+        yield when(self.a >= 1.05, self.full == pre(self.full) + 1)
+        yield when(time >= 3.001, self.level == 0.6, reinit(self.x, 0.1))
+
+
+def test_whens_act_between_and_at_instants_as_by_the_integrator(monkeypatch):
+    ours = simulate(Counted(), stop=6.0, points=101)
+    monkeypatch.setattr(Sampler, "suits", False)
+    other = simulate(Counted(), stop=6.0, points=101)
+    np.testing.assert_array_equal(ours.final("full"), other.final("full"))
+    assert ours.final("crossed") == 2
+    assert other.final("crossed") == 2
+    for name in ("time", "x", "a", "level", "at"):
+        mine, theirs = (r.time if name == "time" else r[name] for r in (ours, other))
+        np.testing.assert_allclose(mine, theirs, rtol=0, atol=3e-8)
+
+
+def test_a_when_that_never_acts_leaves_the_sampling_to_explicit_steps(monkeypatch):
+    calls = []
+    over = Sampler.over
+    monkeypatch.setattr(Sampler, "over", lambda *a: calls.append(over(*a)) or calls[-1])
+
+    class Idle(Model):
+        a = Real(start=0.0)
+        x = Real(start=0.0, fixed=True)
+        m = Discrete(0)
+
+        def equations(self):
+            yield der(self.x) == -self.x + self.a
+            yield sampled(self.a, 0.9 * self.a + 0.1 - 0.01 * self.x, period=0.001)
+            yield when(self.x >= 50.0, self.m == pre(self.m) + 1)
+
+    simulate(Idle(), stop=2.0)
+    assert len(calls) < 20  # for 2,000 instants
+    assert min(calls) > 0

@@ -1,0 +1,95 @@
+"""Whether the rates of a motion between its places are what the motion says: forces that are narrow along its path.
+
+An integrator that takes long steps sees the rates at their ends only. Between two places the motion is the cubic by states
+and rates at both; in the middle its rate is held against that of the equations there. What differs by more than a share of
+the motion was stepped over, and is integrated again in short steps.
+"""
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.language.symbols import time
+from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.trail import Trail
+
+LOST = 1e-3  # of a state, or of its size: what an interval may lose by rates that were not seen
+SEEN = 2  # steps of the integrator in an interval: rates in it were seen
+STARTING = 30  # steps of the integrator after it starts anew
+PARTS = 4  # steps at least in an interval in which rates were not seen
+AROUND = 2  # intervals behind such a one
+
+
+class NarrowForces:
+    """The intervals of a run in which steps are kept short, `until` a time, s, to `step`, s."""
+
+    def __init__(self, coordinates: Coordinates):
+        self.coordinates = coordinates
+        self.begin = self.until = -np.inf
+        self.step = np.inf
+
+    def longest(self, t: float) -> float:
+        """The longest step behind a time, s."""
+        return self.step if self.begin <= t < self.until else np.inf
+
+    def stepped_over(self, trail: Trail, here: int, count: int, steps: int, sizes: np.ndarray) -> bool:
+        """Whether rates were stepped over in some intervals behind a place, which took so many steps; then they are short
+        around the first of these. sizes: of the states.
+        """
+        c = self.coordinates
+        if not c.curved or steps - STARTING > SEEN * count or self.longest(float(trail.t[here])) < np.inf:
+            return False
+        lost = self._lost(trail, np.arange(here, here + count + 1), sizes)
+        if not lost.any():
+            return False
+        first = here + int(np.argmax(lost))
+        begin, end = max(first - 1, here), min(first + 1 + AROUND, trail.last)
+        self.begin, self.until = float(trail.t[begin]), float(trail.t[end])
+        self.step = float(trail.t[first + 1] - trail.t[first]) / PARTS
+        trail.stops[[begin, end]] = True
+        return True
+
+    def _lost(self, trail: Trail, places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """In which intervals between places the rates in the middle are others than those of the motion."""
+        x, z, t, w = trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
+        h = np.diff(t)[:, None]
+        rates = at_places(self.rates, x, z, t[:, None], t[:, None], w)[0]
+        middle = (x[1:] + x[:-1]) / 2 - h / 8 * np.diff(rates, axis=0)
+        along = 1.5 * np.diff(x, axis=0) / h - (rates[1:] + rates[:-1]) / 4
+        begin, at, w = t[:-1], (t[1:] + t[:-1]) / 2, w[:-1]
+        forces = self.coordinates.settle(middle, (z[1:] + z[:-1]) / 2, at, w)
+        point = middle, forces, at[:, None], begin[:, None], w
+        defect = h * (at_places(self.rates, *point)[0] - along)
+        allowed = LOST * np.maximum(np.maximum(np.abs(x[1:]), np.abs(x[:-1])), sizes)
+        lost = ~np.all(np.abs(defect) <= allowed, axis=1)
+        for k in np.flatnonzero(lost):  # stiff equations make much of small errors of the states
+            slopes = self._slopes(*(p[k : k + 1] for p in point))
+            found = np.linalg.lstsq(np.eye(len(slopes)) - h[k] / 2 * slopes, defect[k], rcond=None)[0]
+            lost[k] = np.any(np.abs(found) > allowed[k])
+        return lost
+
+    def _slopes(self, *point: np.ndarray) -> np.ndarray:
+        """Jacobian of the rates at a point, with what the algebraics make of it."""
+        n, m = len(self.coordinates.states), len(self.coordinates.algebraics)
+        parts = at_places(self._jacobian, *point)
+        shapes = (n, n), (m, n), (n, m), (m, m)  # columns, rows
+        by_x, by_z, own, inner = (
+            np.nan_to_num(p[0]).reshape(k).T for p, k in zip(parts, shapes, strict=True)
+        )
+        return by_x - by_z @ np.linalg.lstsq(inner, own, rcond=None)[0] if m else by_x
+
+    @property
+    def rates(self) -> ca.Function:
+        """X' as a function of x, z, time, t0, w."""
+        c = self.coordinates
+        arguments = [c.x, c.z, time, c.t0, c.w]
+        return c.kept("rates", lambda: ca.Function("rates", arguments, [ca.densify(c.ode)], {"cse": True}))
+
+    @property
+    def _jacobian(self) -> ca.Function:
+        c = self.coordinates
+        found = [ca.jacobian(e, y) for e in (c.ode, c.algebraic) for y in (c.x, c.z)]
+        arguments = [c.x, c.z, time, c.t0, c.w]
+        return c.kept(
+            "slopes", lambda: ca.Function("slopes", arguments, [ca.densify(e) for e in found], {"cse": True})
+        )
