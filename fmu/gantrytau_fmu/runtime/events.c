@@ -200,21 +200,30 @@ static double gt_next_sample(gt_instance *it, double end) {
     return next;
 }
 
-/* Take the samples that are due; all updates use the values before the instant. */
-static gt_status gt_sample(gt_instance *it, int *sampled) {
-    double periods[GT_ROOM(GT_CLOCKS)], held[GT_ROOM(GT_HELD_COUNT)];
-    int due[GT_ROOM(GT_CLOCKS)], i;
-    gt_status status;
-    *sampled = 0;
-    if (!GT_CLOCKS) return GT_OK;
+/* Which clocks tick now; whether any does. */
+static int gt_find_due(gt_instance *it, double *periods, int *due) {
+    int i, any = 0;
+    if (!GT_CLOCKS) return 0;
     gt_parameters(it);
     gt_periods(it->a, periods, it->w);
     for (i = 0; i < GT_CLOCKS; i++) {
         due[i] = gt_next_tick(it, i, periods) <= it->now.time + gt_on_time(it->now.time, periods[i]);
-        *sampled |= due[i];
+        any |= due[i];
     }
+    return any;
+}
+
+/* Take the samples that are due; all updates use the values before the instant, with the inputs of the instant. */
+static gt_status gt_sample(gt_instance *it, int *sampled) {
+    double periods[GT_ROOM(GT_CLOCKS)], held[GT_ROOM(GT_HELD_COUNT)];
+    int due[GT_ROOM(GT_CLOCKS)], changed, i;
+    gt_status status;
+    *sampled = gt_find_due(it, periods, due);
     if (!*sampled) return GT_OK;
-    status = gt_refresh(it);
+    it->sampling = 1;
+    status = gt_agree(it, &changed);
+    it->sampling = 0;
+    if (status == GT_OK) status = gt_refresh(it);
     if (status != GT_OK) return status;
     gt_samples(it->a, held, it->w);
     for (i = 0; i < GT_HELD_COUNT; i++)
@@ -326,9 +335,9 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     if (!it->cosimulation) status = gt_remember(it);
     if (status == GT_OK && !it->cosimulation) status = gt_begin_past(it);
 #endif
-    if (status == GT_OK) status = gt_sample(it, &sampled);
+    if (status == GT_OK && !it->closing) status = gt_sample(it, &sampled);
 #if GT_DELAYS
-    gt_arrive(it);
+    if (!it->closing) gt_arrive(it);
 #endif
     memset(info, 0, sizeof *info);
     for (round = 0; status == GT_OK && acted; round++) {

@@ -250,6 +250,19 @@ static gt_status gt_handle_events(gt_instance *it, int *events) {
     return GT_OK;
 }
 
+/* What happens at the end of a step. Samples wait for the inputs of the next one, and are taken of what was before. */
+static gt_status gt_finish(gt_instance *it, int *events) {
+    double periods[GT_ROOM(GT_CLOCKS)];
+    int due[GT_ROOM(GT_CLOCKS)];
+    gt_status status;
+    if (!GT_MODES && !GT_WHENS) return GT_OK;
+    it->closing = it->now.waiting = gt_find_due(it, periods, due);
+    if (it->closing) gt_keep_before(it, 0);
+    status = gt_handle_events(it, events);
+    it->closing = 0;
+    return status;
+}
+
 static gt_status gt_step(gt_instance *it, double time, double size, double *reached) {
     const double end = time + size;
     double turn = INFINITY;
@@ -260,15 +273,8 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
                       "tell", GT_NAME, size, time);
     it->now.time = time;
     it->stepping = 1;
-    if (GT_CLOCKS && it->now.first) {
-        memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_STEPPING * sizeof(double));
-        memcpy(it->now.x, it->now.first_x, sizeof it->now.x);
-        memcpy(it->now.holds, it->now.first_holds, sizeof it->now.holds);
-        it->now.ended = 0;
-        memset(it->now.ticks, 0, sizeof it->now.ticks);
-        it->now.stale = it->outputs_stale = 1;
-    }
-    it->now.first = 0;
+    if (it->now.waiting) gt_keep_before(it, 1);
+    it->now.waiting = 0;
 #if GT_DELAYS
     status = gt_begin_past(it);
 #endif
@@ -286,6 +292,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
         if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);
         if (!event && it->now.time >= end) break;
     }
+    if (status == GT_OK && !it->now.ended) status = gt_finish(it, &events);
     it->stepping = 0;
     if (status != GT_OK && !it->now.stale) gt_step_back(it);
     it->time = it->now.time;

@@ -85,16 +85,19 @@ static gt_status gt_look_at_gaps(gt_instance *it, gt_gaps *found) {
     return status;
 }
 
-/* The modes just after the present instant: where a margin is zero, its rate decides. */
+/* The modes just after the present instant: where a margin is zero, its rate decides, or, for samples, it has not turned. */
 static void gt_following(const gt_instance *it, const gt_margins *at, double *modes) {
     int i, more = GT_TURNS;
     for (i = 0; i < GT_TURNS; i++) {
         const double slack = fmax(it->now.slack[i], gt_turn_counts[i] ? it->now.slack[more++] : 0);
         const double value = at->values[i], whole = gt_turn_counts[i] ? nearbyint(value) : 0;
+        const double kept = it->now.m[GT_FRICTIONS + i];
         /* as near as a crossing is located, so that what turns round there is not left behind it */
         const double late = GT_LATE + GT_LATE_BY_TIME * fabs(it->now.time);
         const double near = GT_NEAR * at->noise[i] + late * fabs(at->rates[i]) + 1.5 * slack;
-        if (fabs(value - whole) <= near && at->rates[i] != 0)
+        if (it->sampling && fabs(value - whole) <= near && (!gt_turn_counts[i] || kept == whole || kept == whole - 1))
+            modes[i] = kept;
+        else if (fabs(value - whole) <= near && at->rates[i] != 0)
             modes[i] = gt_turn_counts[i] ? whole - (at->rates[i] < 0) : at->rates[i] > 0;
         else
             modes[i] = gt_turn_counts[i] ? floor(value) : gt_turn_closed[i] ? value >= 0 : value > 0;
