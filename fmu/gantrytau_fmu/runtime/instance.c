@@ -17,7 +17,7 @@
 typedef struct {
     double held[GT_ROOM(GT_STEPPING)], x[GT_ROOM(GT_STATES)], m[GT_ROOM(GT_MODES)], rest[GT_ROOM(GT_FRICTIONS)], ticks[GT_ROOM(GT_CLOCKS)];
     int holds[GT_ROOM(GT_WHENS)];
-} gt_before;
+} gt_earlier;
 
 /* What a saved state holds: plain numbers, so that saving is a copy. */
 typedef struct {
@@ -36,7 +36,7 @@ typedef struct {
     /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
     double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)], kept_rates[GT_ROOM(GT_STATES)]; /* there, in Model Exchange */
-    gt_before before;
+    gt_earlier before;
     int holds[GT_ROOM(GT_WHENS)];     /* whether conditions of whens did when they were looked at last */
     double slack[GT_ROOM(GT_GAPS)];   /* how far behind a turn its mode was found to be that before it, for it turns round there */
     int ended;                        /* number, from 1, of the when that has ended the run */
@@ -141,7 +141,7 @@ static void gt_point_at(gt_instance *it, const double *time, const double *x) {
 
 /* Keep what events change, or go back to what was kept. */
 static void gt_keep_before(gt_instance *it, int back) {
-    gt_before *before = &it->now.before;
+    gt_earlier *before = &it->now.before;
 #define GT_COPY(kept, now, size) memcpy(back ? (void *)(now) : (void *)(kept), back ? (kept) : (now), size)
     GT_COPY(before->held, it->now.u + GT_INPUTS, GT_STEPPING * sizeof(double));
     GT_COPY(before->x, it->now.x, sizeof before->x);
