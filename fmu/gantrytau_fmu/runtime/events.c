@@ -7,7 +7,7 @@
 #define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
 #define GT_MARGIN 1e-9       /* of the breakaway force */
 #define GT_MOST_ROUNDS 50    /* of whens at one instant */
-#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, but no more than GT_CROWDED_TIME, or in one communication step */
+#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, but no more than GT_CROWDED_TIME */
 #define GT_CROWDED 1e-5
 #define GT_CROWDED_TIME 1e-3 /* s: of a motion that goes on, a million events in a second are not expected */
 
