@@ -18,7 +18,6 @@ END = 1.0  # s
 PERIODS = (0.05, 0.1, 0.15)
 UNSURE = 1e-6  # of what a piece or a condition asks for: rounding decides
 FAR = 100.0  # of states: such laws are left out
-COUNTS, TURNS = 1, 2  # what a when does to d
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,88 +30,120 @@ class SampledLaw:
     end: np.ndarray | None
 
 
-def random_law(rng: np.random.Generator) -> SampledLaw:
-    """One or two states, two or three variables that are sampled, each behind a piece, and one when."""
-    n, k = int(rng.integers(1, 3)), int(rng.integers(2, 4))
-    a = rng.normal(size=(n, n)).round(1) - 1.5 * np.eye(n)
-    names = [str(name) for name in rng.choice(list(SHAPES), k + 1)]  # of the samples, then of the force
-    periods = rng.choice(PERIODS, k).tolist()
-    known = n + k + 2  # x, s, r, d
-    inside = rng.normal(size=(k + 1, known)).round(1)
-    inside[k, :n] = 0.0  # the force follows what is held
-    straight = (0.4 * rng.normal(size=(k, known))).round(1)
-    x0, s0 = rng.normal(size=n).round(1), rng.normal(size=k).round(1)
-    jumps = np.unique([0.0, *rng.choice([0.1, 0.15, 0.2, 0.3, 0.333, 0.45, 0.6, 0.707], 3)])
-    r = Samples(jumps, rng.normal(size=jumps.size).round(1), kind="constant")
-    asked, border = (2 * rng.normal(size=k)).round(1), round(float(rng.normal()), 2)
-    by_time = bool(rng.random() < 0.3)
-    does = int(rng.choice([COUNTS, TURNS]))
-    if by_time:
-        border = float(rng.choice([0.2, 0.3, 0.4321]))
+class _UnsureError(Exception):
+    pass
 
-    class Random(Model):
-        r = Input(start=0.0)
-        x = Real(n, start=x0.tolist(), fixed=True)
-        s = Real(k, start=s0.tolist())
-        d = Discrete(0.0)
 
-        def equations(self) -> Any:
-            values = ca.vertcat(self.x, self.s, self.r, self.d)
-            pieces = [
-                SHAPES[name][0](ca.dot(ca.DM(inside[i]), values)) for i, name in enumerate(names)
-            ]
-            force = ca.vertcat(pieces[k], *[0.0] * (n - 1))
-            yield der(self.x) == ca.mtimes(ca.DM(a), self.x) + force
-            for i, period in enumerate(periods):
-                yield sampled(self.s[i], ca.dot(ca.DM(straight[i]), values) + pieces[i], period=period)
-            condition = time >= border if by_time else ca.dot(ca.DM(asked), self.s) > border
-            yield when(condition, self.d == (pre(self.d) + 1 if does == COUNTS else 1 - pre(self.d)))
+@dataclass(frozen=True)
+class _Law:
+    """x' = a x + force; straight (k, n + k + 2) and inside (k + 1, n + k + 2) times x, s, r, d are what is sampled, and what
+    the pieces `names` are of, the force last; the when asks for the time or for `asked` s above a border.
+    """
 
-    def piece(i: int, values: np.ndarray) -> float:
-        _, borders, lines = SHAPES[names[i]]
-        z = float(inside[i] @ values)
+    a: np.ndarray
+    names: list[str]
+    periods: list[float]
+    inside: np.ndarray
+    straight: np.ndarray
+    x0: np.ndarray
+    s0: np.ndarray
+    jumps: np.ndarray
+    r: np.ndarray
+    asked: np.ndarray
+    border: float
+    by_time: bool
+    counts: bool
+
+    def piece(self, i: int, values: np.ndarray) -> float:
+        _, borders, lines = SHAPES[self.names[i]]
+        z = float(self.inside[i] @ values)
         if min(abs(z - b) for b in borders) < UNSURE * (1 + abs(z)):
             raise _UnsureError
         slope, shift = lines[int(np.searchsorted(borders, z))]
         return slope * z + shift
 
-    def holds(t: float, s: np.ndarray) -> bool:
-        if by_time:
-            return t >= border - 1e-9
-        if abs(asked @ s - border) < UNSURE:
+    def holds(self, t: float, s: np.ndarray) -> bool:
+        if self.by_time:
+            return t >= self.border - 1e-9
+        if abs(self.asked @ s - self.border) < UNSURE:
             raise _UnsureError
-        return bool(asked @ s > border)
+        return bool(self.asked @ s > self.border)
 
-    def end() -> np.ndarray:
-        x, s, d, held = x0, s0, 0.0, True
-        instants = {round(j * p, 9) for p in periods for j in range(round(END / p) + 1)}
-        instants = sorted({0.0, END, *instants, *jumps.tolist(), *([border] if by_time else [])})
-        instants = [t for t in instants if t <= END]
+    def end(self) -> np.ndarray:
+        x, s, d, held, n = self.x0, self.s0, 0.0, True, self.x0.size
+        ticks = {round(j * p, 9) for p in self.periods for j in range(round(END / p) + 1)}
+        ticks |= {0.0, END, *self.jumps.tolist(), *([self.border] if self.by_time else [])}
+        instants = sorted(t for t in ticks if t <= END)
         for t, until in zip(instants, [*instants[1:], END], strict=True):
-            u = float(r.values[np.searchsorted(r.times, t + 1e-9) - 1, 0])
-            values = np.concatenate([x, s, [u, d]])
-            due = [abs(t / p - round(t / p)) < 1e-6 for p in periods]
-            new = [float(straight[i] @ values) + piece(i, values) if due[i] else s[i] for i in range(k)]
-            s, now = np.array(new), holds(t, np.array(new))
-            if now and not held:
-                d = d + 1 if does == COUNTS else 1 - d
-            held = now
-            force = piece(k, np.concatenate([x, s, [u, d]]))
+            r = float(self.r[np.searchsorted(self.jumps, t + 1e-9) - 1])
+            values = np.concatenate([x, s, [r, d]])
+            due = [abs(t / p - round(t / p)) < 1e-6 for p in self.periods]
+            new = [
+                self.straight[i] @ values + self.piece(i, values) if due[i] else s[i] for i in range(s.size)
+            ]
+            s, before = np.array(new, dtype=float), held
+            held = self.holds(t, s)
+            if held and not before:
+                d = d + 1 if self.counts else 1 - d
             whole = np.zeros((n + 1, n + 1))
-            whole[:n, :n], whole[0, n] = a, force
+            whole[:n, :n], whole[0, n] = self.a, self.piece(s.size, np.concatenate([x, s, [r, d]]))
             x = (expm(whole * (until - t)) @ np.append(x, 1.0))[:n]
             if not np.abs(np.append(x, s)).max() < FAR:
                 raise _UnsureError
         return np.concatenate([x, s, [d]])
 
+    def model(self) -> type[Model]:
+        law, n, k = self, self.x0.size, self.s0.size
+
+        class Random(Model):
+            r = Input(start=0.0)
+            x = Real(n, start=law.x0.tolist(), fixed=True)
+            s = Real(k, start=law.s0.tolist())
+            d = Discrete(0.0)
+
+            def equations(self) -> Any:
+                values = ca.vertcat(self.x, self.s, self.r, self.d)
+                pieces = [
+                    SHAPES[name][0](ca.dot(ca.DM(law.inside[i]), values)) for i, name in enumerate(law.names)
+                ]
+                yield der(self.x) == ca.mtimes(ca.DM(law.a), self.x) + ca.vertcat(pieces[k], *[0.0] * (n - 1))
+                for i, period in enumerate(law.periods):
+                    yield sampled(
+                        self.s[i], ca.dot(ca.DM(law.straight[i]), values) + pieces[i], period=period
+                    )
+                condition = (
+                    time >= law.border if law.by_time else ca.dot(ca.DM(law.asked), self.s) > law.border
+                )
+                yield when(condition, self.d == (pre(self.d) + 1 if law.counts else 1 - pre(self.d)))
+
+        return Random
+
+
+def random_law(rng: np.random.Generator) -> SampledLaw:
+    """One or two states, two or three variables that are sampled, each behind a piece, and one when."""
+    n, k = int(rng.integers(1, 3)), int(rng.integers(2, 4))
+    known = n + k + 2  # x, s, r, d
+    inside = rng.normal(size=(k + 1, known)).round(1)
+    inside[k, :n] = 0.0  # the force follows what is held
+    jumps = np.unique([0.0, *rng.choice([0.1, 0.15, 0.2, 0.3, 0.333, 0.45, 0.6, 0.707], 3)])
+    by_time = bool(rng.random() < 0.3)
+    law = _Law(
+        a=rng.normal(size=(n, n)).round(1) - 1.5 * np.eye(n),
+        names=[str(name) for name in rng.choice(list(SHAPES), k + 1)],
+        periods=rng.choice(PERIODS, k).tolist(),
+        inside=inside,
+        straight=(0.4 * rng.normal(size=(k, known))).round(1),
+        x0=rng.normal(size=n).round(1),
+        s0=rng.normal(size=k).round(1),
+        jumps=jumps,
+        r=rng.normal(size=jumps.size).round(1),
+        asked=(2 * rng.normal(size=k)).round(1),
+        border=float(rng.choice([0.2, 0.3, 0.4321])) if by_time else round(float(rng.normal()), 2),
+        by_time=by_time,
+        counts=bool(rng.random() < 0.5),
+    )
     try:
-        there = end()
+        end = law.end()
     except _UnsureError:
-        there = None
-    text = f"A {a.tolist()}, {names}, periods {periods}, inside {inside.tolist()}, straight {straight.tolist()}, x0 {x0.tolist()}, "
-    text += f"s0 {s0.tolist()}, r {jumps.tolist()} {r.values.ravel().tolist()}, when {asked.tolist()} {border} {by_time} {does}"
-    return SampledLaw(text, Random, r, there)
-
-
-class _UnsureError(Exception):
-    pass
+        end = None
+    return SampledLaw(str(law), law.model(), Samples(law.jumps, law.r, kind="constant"), end)

@@ -44,7 +44,9 @@ def passage(coordinates: Coordinates) -> Passage:
     if behind is not None:
         before = ca.if_else(jump, behind(far, z, t + h, before), before)
         z = equations.algebraics(far, t + h, t + h, before)
-        led_on = ca.norm_inf(behind(far, z, t + h, before) - before) > 0  # modes and unknowns lead to others again
+        led_on = (
+            ca.norm_inf(behind(far, z, t + h, before) - before) > 0
+        )  # modes and unknowns lead to others again
         far = far + ca.if_else(ca.logic_and(jump, led_on), math.nan, 0.0)
     renewal = _renewal(coordinates, by_held)(far, z, t + h, before, due)
     y = ca.vertcat(x, own)
@@ -111,7 +113,9 @@ def _behind_jumps(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Functi
             jumping = ca.vertcat(jumping, coordinates.w[first + k])
     if jumping.numel() == sampled + coordinates.z.numel():
         return None
-    return ca.Function("behind", [coordinates.x, coordinates.z, time, coordinates.w], [ca.densify(w)], {"cse": True})
+    return ca.Function(
+        "behind", [coordinates.x, coordinates.z, time, coordinates.w], [ca.densify(w)], {"cse": True}
+    )
 
 
 def _following_held(coordinates: Coordinates) -> tuple[int, ...]:

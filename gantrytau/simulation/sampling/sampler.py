@@ -151,7 +151,9 @@ class Sampler:
         last = (inner == parts[interval] - 1)[:, None]
         due, jumps = trail.due[places[behind]] & last, (t[behind] == t[behind - 1])[:, None] & last
         w = trail.rows(places)[:, :half]
-        return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[behind], jumps])
+        return np.hstack(
+            [np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[behind], jumps]
+        )
 
     def _error(self, found: StepsTaken, h: np.ndarray) -> np.ndarray:
         """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""
