@@ -108,7 +108,7 @@ class Changes:
         trail.z[k] = self._settled(k)
 
     def behind_inputs(self, k: int) -> int:
-        """From the place before a jump of inputs to that behind it, which is returned; modes follow it, as samples see them."""
+        """From the place before a jump of inputs to that behind it, which is returned, with the modes that samples see."""
         trail = self.trail
         trail.x[k + 1], trail.z[k + 1], trail.held[k + 1] = trail.x[k], trail.z[k], trail.held[k]
         trail.z[k + 1] = self._settled(k + 1)

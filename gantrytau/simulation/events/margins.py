@@ -101,7 +101,7 @@ class Switches:
         return np.where(self._counts, np.round(margins), 0.0)
 
     def following(self, margins: Margins, before: np.ndarray | None = None) -> np.ndarray:
-        """The modes just after one place: where a margin is zero, its rate decides, or those before stay if they are given."""
+        """The modes just after one place: where a margin is zero, its rate decides, or those `before` stay."""
         values, rates, noise = margins.values[0], margins.rates[0], margins.noise[0]
         whole = self.whole(values)
         rest = values - whole
