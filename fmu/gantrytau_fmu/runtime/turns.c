@@ -47,6 +47,7 @@ static gt_status gt_look(gt_instance *it, gt_margins *found) {
     double both[GT_ROOM(2 * GT_TURNS)], rates[GT_ROOM(GT_STATES)], spacing;
     gt_status status = gt_refresh(it);
     int i;
+    found->rates[GT_TURNS] = 0;
     if (status != GT_OK || !GT_TURNS) return status;
     gt_rates(it->a, rates, it->w);
     gt_along_motion(it, rates);
