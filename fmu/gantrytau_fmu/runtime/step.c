@@ -244,10 +244,20 @@ static gt_status gt_integrate(gt_instance *it, double end, int *event) {
 /* All that happens at the present time. */
 static gt_status gt_handle_events(gt_instance *it) {
     gt_event_info info;
-    gt_status status;
-    do status = gt_update(it, &info);
-    while (status == GT_OK && info.again);
-    return status;
+    do {
+        const gt_status status = gt_update(it, &info);
+        if (status != GT_OK) return status;
+        if (it->now.time - it->counted_since > GT_CROWDED_TIME) {
+            it->counted = 0;
+            it->counted_since = it->now.time;
+        }
+        it->counted += info.again;
+        if (it->counted > GT_MOST_EVENTS)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s of one communication step, the last of %s at time = "
+                          "%.9g s; take a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS,
+                          GT_CROWDED_TIME, it->last_event, it->now.time);
+    } while (info.again);
+    return GT_OK;
 }
 
 /* What happens at the end of a step. Samples wait for the inputs of the next one, and are taken of what was before. */
@@ -273,6 +283,8 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
                       "tell", GT_NAME, size, time);
     it->now.time = time;
     it->stepping = 1;
+    it->counted = 0;
+    it->counted_since = time;
     if (it->now.waiting) gt_keep_before(it, 1);
     it->now.waiting = 0;
 #if GT_DELAYS
