@@ -69,6 +69,8 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
     point = ca.vertcat(s["t"], s["x"], s["u"], s["z"])
     way = ca.vertcat(s["dt"], s["dx"], s["du"], s["dz"])
     everything = column([formulas.rates, formulas.residuals, wanted])
+    phases = _along(formulas.switching.phases, point, way).elements()
+    pace = reduce(ca.fmax, [ca.fabs(rate) for rate in phases], ca.SX(0.0))
     named = {
         "gt_rates": formulas.rates,
         "gt_outputs": wanted,
@@ -84,7 +86,7 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         "gt_past_rates": _along(formulas.past, point, way),
         "gt_delay_times": formulas.delay_times,
         "gt_turning": column([formulas.switching.margins, formulas.switching.noise]),
-        "gt_turning_rates": _along(formulas.switching.margins, point, way),
+        "gt_turning_rates": column([_along(formulas.switching.margins, point, way), pace]),
         "gt_forward": _along(everything, point, way),
         "gt_by_parameters": _along(everything, s["p"], s["dp"]),
         "gt_initial_slopes": _along(

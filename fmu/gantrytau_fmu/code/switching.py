@@ -14,6 +14,7 @@ from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.pattern import Pattern
 from gantrytau.compiler.system import System
 from gantrytau.compiler.translated import solved
+from gantrytau.language.instructions import computed
 from gantrytau.language.piecewise import Turn
 from gantrytau.simulation.events.margins import ROUNDING
 from gantrytau.simulation.events.modes import InModes, in_modes, sorted_out
@@ -40,7 +41,7 @@ class Switching:
 
     noise: what rounding makes of a margin that is zero, without that of the time; timed: whether a margin is linear in
     time and holds nothing else that moves; conditions: what they ask for, in the model's words; outside: the other modes,
-    as what they are.
+    as what they are; phases: arguments of sines, cosines and tangents, by which margins come and go.
     """
 
     turns: tuple[Turn, ...]
@@ -48,6 +49,7 @@ class Switching:
     timed: tuple[bool, ...]
     conditions: tuple[str, ...]
     outside: Substitution
+    phases: ca.SX
 
     @property
     def modes(self) -> ca.SX:
@@ -98,13 +100,29 @@ def switching(found: WithModes, system: System, also: frozenset[str] = frozenset
         *(t.mode for t in found.pieces.switched.switches if t.mode.name() in also),
     ]
     turns, outside = sorted_out(found.pieces.switched.switches, needed, way)
+    margins = column([ca.densify(turn.margin) for turn in turns])
+    seen = [margins, system.residuals] if ca.depends_on(margins, system.z) else [margins]
     return Switching(
         turns=tuple(turns),
-        noise=_noise(system, column([ca.densify(turn.margin) for turn in turns])),
+        noise=_noise(system, margins),
         timed=tuple(_is_timed(system, turn.margin) for turn in turns),
         conditions=tuple(found.pieces.asked(turn.mode.name(), found.dae) for turn in turns),
         outside=outside,
+        phases=_phases(column(seen), ca.vertcat(system.time, system.x, system.z)),
     )
+
+
+def _phases(expressions: ca.SX, moving: ca.SX) -> ca.SX:
+    leaves, found = ca.symvar(expressions), []
+
+    def operation(operator: int, operands: list[ca.SX]) -> ca.SX:
+        if operator in (ca.OP_SIN, ca.OP_COS, ca.OP_TAN) and ca.depends_on(operands[0], moving):
+            found.append(operands[0] * (2 if operator == ca.OP_TAN else 1))
+        return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operator, *operands)
+
+    whole = ca.Function("whole", [column(leaves)], [ca.densify(expressions)], {"cse": True})
+    computed(whole, lambda _, k: leaves[k], ca.SX, operation)
+    return column(found)
 
 
 def _noise(system: System, margins: ca.SX) -> ca.SX:

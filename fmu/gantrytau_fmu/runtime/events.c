@@ -1,5 +1,4 @@
-/* Events: sampled variables at multiples of their period, friction that locks, slides forward or backward, switches that
- * turn (turns.c), and what is done when conditions become true.
+/* Events: samples (samples.c), friction that locks, slides forward or backward, switches that turn (turns.c), and what is done when conditions become true.
  *
  * While a friction is locked its force is an unknown that keeps the speed at zero; it breaks away when that
  * force passes its limit. A sliding one locks when its speed comes to zero.
@@ -8,10 +7,9 @@
 #define GT_REST 1e-8         /* m/s or rad/s: a speed that has gone that far beyond zero has crossed it */
 #define GT_MARGIN 1e-9       /* of the breakaway force */
 #define GT_MOST_ROUNDS 50    /* of whens at one instant */
-#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, but no more than GT_CROWDED_TIME, or in one communication step */
+#define GT_MOST_EVENTS 1000  /* within GT_CROWDED of the run, but no more than GT_CROWDED_TIME */
 #define GT_CROWDED 1e-5
 #define GT_CROWDED_TIME 1e-3 /* s: of a motion that goes on, a million events in a second are not expected */
-#define GT_ON_TIME 1e-6      /* of a period: instants that close are the same, also where masters add up their steps */
 
 /* Speed and breakaway force of each friction, (2, GT_FRICTIONS), rows first. */
 static gt_status gt_laws(gt_instance *it, double *laws) {
@@ -169,70 +167,6 @@ static int gt_sticks(const gt_instance *it) {
     return 0;
 }
 
-static double gt_next_tick(const gt_instance *it, int clock, const double *periods) {
-    return it->now.start + it->now.ticks[clock] * periods[clock];
-}
-
-static gt_status gt_check_clocks(gt_instance *it) {
-    double periods[GT_ROOM(GT_CLOCKS)];
-    int i;
-    if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
-    for (i = 0; i < GT_CLOCKS; i++)
-        if (!(periods[i] > 0) || !isfinite(periods[i]))
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the sampling period of %s is %g s, expected one above zero", GT_NAME,
-                          gt_clock_names[i], periods[i]);
-    return GT_OK;
-}
-
-static double gt_on_time(double time, double period) {
-    return GT_ON_TIME * period + 4.5e-16 * fabs(time);
-}
-
-/* The earliest sampling instant to come that is before `end`; INFINITY if there is none. */
-static double gt_next_sample(gt_instance *it, double end) {
-    double periods[GT_ROOM(GT_CLOCKS)], next = INFINITY;
-    int i;
-    if (GT_CLOCKS) gt_periods(it->a, periods, it->w);
-    for (i = 0; i < GT_CLOCKS; i++) {
-        const double tick = gt_next_tick(it, i, periods);
-        if (tick < next && tick + gt_on_time(tick, periods[i]) < end) next = tick;
-    }
-    return next;
-}
-
-/* Take the samples that are due; all updates use the values before the instant. */
-static gt_status gt_sample(gt_instance *it, int *sampled) {
-    double periods[GT_ROOM(GT_CLOCKS)], held[GT_ROOM(GT_HELD_COUNT)];
-    int due[GT_ROOM(GT_CLOCKS)], i;
-    gt_status status;
-    *sampled = 0;
-    if (!GT_CLOCKS) return GT_OK;
-    gt_parameters(it);
-    gt_periods(it->a, periods, it->w);
-    for (i = 0; i < GT_CLOCKS; i++) {
-        due[i] = gt_next_tick(it, i, periods) <= it->now.time + gt_on_time(it->now.time, periods[i]);
-        *sampled |= due[i];
-    }
-    if (!*sampled) return GT_OK;
-    status = gt_refresh(it);
-    if (status != GT_OK) return status;
-    gt_samples(it->a, held, it->w);
-    for (i = 0; i < GT_HELD_COUNT; i++)
-        if (due[gt_held_clocks[i]] && !isfinite(held[i]))
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the sample of %s is not a finite number at time = %.9g s", GT_NAME,
-                          gt_held_names[i], it->now.time);
-    for (i = 0; i < GT_HELD_COUNT; i++)
-        if (due[gt_held_clocks[i]]) it->now.u[GT_INPUTS + i] = held[i];
-    for (i = 0; i < GT_CLOCKS; i++)
-        if (due[i]) {
-            const double gone = it->now.time + gt_on_time(it->now.time, periods[i]) - it->now.start;
-            it->now.ticks[i] = fmax(it->now.ticks[i], floor(gone / periods[i])) + 1;
-            it->last_event = gt_clock_names[i];
-        }
-    it->now.stale = it->outputs_stale = 1;
-    return GT_OK;
-}
-
 /* Which conditions of whens hold at the present point, with its modes. */
 static gt_status gt_find_conditions(gt_instance *it, int *holds) {
     double found[GT_ROOM(GT_WHENS)];
@@ -244,7 +178,7 @@ static gt_status gt_find_conditions(gt_instance *it, int *holds) {
     return GT_OK;
 }
 
-/* What is true at the start has not become true, but for whens that act initially. */
+/* What is true at the start, behind its samples, has not become true, but for whens that act initially. */
 static gt_status gt_begin_whens(gt_instance *it) {
     int changed, i;
     gt_status status = GT_OK;
@@ -252,8 +186,7 @@ static gt_status gt_begin_whens(gt_instance *it) {
     it->now.events_since = it->now.time;
     if (!GT_WHENS) return GT_OK;
     status = gt_agree(it, &changed);
-    if (status == GT_OK) status = gt_find_conditions(it, it->now.holds);
-    for (i = 0; i < GT_WHENS; i++) it->now.holds[i] &= !gt_when_initially[i];
+    for (i = 0; i < GT_WHENS; i++) it->now.holds[i] = !gt_when_initially[i];
     return status;
 }
 
@@ -326,9 +259,9 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     if (!it->cosimulation) status = gt_remember(it);
     if (status == GT_OK && !it->cosimulation) status = gt_begin_past(it);
 #endif
-    if (status == GT_OK) status = gt_sample(it, &sampled);
+    if (status == GT_OK && !it->closing) status = gt_sample(it, &sampled);
 #if GT_DELAYS
-    gt_arrive(it);
+    if (!it->closing) gt_arrive(it);
 #endif
     memset(info, 0, sizeof *info);
     for (round = 0; status == GT_OK && acted; round++) {

@@ -123,10 +123,8 @@ static gt_status gt_initialize(gt_instance *it) {
     if (status == GT_OK) status = gt_begin_modes(it);
     if (status == GT_OK) status = gt_begin_whens(it);
     if (status == GT_OK && !it->cosimulation) return gt_get_rates(it, rates); /* samples are taken in the first event mode */
-    memcpy(it->now.first_held, it->now.u + GT_INPUTS, GT_STEPPING * sizeof(double));
-    memcpy(it->now.first_x, it->now.x, sizeof it->now.x);
-    memcpy(it->now.first_holds, it->now.holds, sizeof it->now.holds);
-    it->now.first = 1;
+    gt_keep_before(it, 0);
+    it->now.waiting = GT_CLOCKS > 0;
     if (status == GT_OK) status = gt_update(it, &info);
     if (status == GT_OK) status = gt_get_rates(it, rates);
     return status;

@@ -13,6 +13,12 @@
 #define GT_SLOPES (GT_STATES + GT_ALGEBRAICS + GT_OUTPUTS)
 #define GT_LARGEST_BLOCK_ROOM GT_ROOM(GT_LARGEST_BLOCK)
 
+/* What events change, as it was just before those of a communication point. */
+typedef struct {
+    double held[GT_ROOM(GT_STEPPING)], x[GT_ROOM(GT_STATES)], m[GT_ROOM(GT_MODES)], rest[GT_ROOM(GT_FRICTIONS)], ticks[GT_ROOM(GT_CLOCKS)];
+    int holds[GT_ROOM(GT_WHENS)];
+} gt_earlier;
+
 /* What a saved state holds: plain numbers, so that saving is a copy. */
 typedef struct {
     double time;
@@ -30,9 +36,7 @@ typedef struct {
     /* measures of singular poses where the blocks were solved last, where the last step ended, and their rates on it */
     double sides[GT_ROOM(GT_SIDES)], kept_time, kept_sides[GT_ROOM(GT_SIDES)], side_rates[GT_ROOM(GT_SIDES)], largest_sides[GT_ROOM(GT_SIDES)];
     double kept_x[GT_ROOM(GT_STATES)], kept_u[GT_ROOM(GT_KNOWN)], kept_z[GT_ROOM(GT_ALGEBRAICS)], root_rates[GT_ROOM(GT_ROOTS)], kept_rates[GT_ROOM(GT_STATES)]; /* there, in Model Exchange */
-    /* held variables, Discretes, states and conditions before the first samples */
-    double first_held[GT_ROOM(GT_STEPPING)], first_x[GT_ROOM(GT_STATES)];
-    int first_holds[GT_ROOM(GT_WHENS)];
+    gt_earlier before;
     int holds[GT_ROOM(GT_WHENS)];     /* whether conditions of whens did when they were looked at last */
     double slack[GT_ROOM(GT_GAPS)];   /* how far behind a turn its mode was found to be that before it, for it turns round there */
     int ended;                        /* number, from 1, of the when that has ended the run */
@@ -40,7 +44,7 @@ typedef struct {
     double events_since;
     int given[GT_ROOM(GT_STATES)];    /* states that were set before initialisation */
     int stop_defined, mode, cosimulation, initialized, stale, starts_stale;
-    int first;     /* no step was taken yet: the first samples are taken again with the inputs it begins with */
+    int waiting;   /* samples are due that are taken with the inputs of the next step, from what was before */
     int ready;     /* the experiment is set up */
     int unsettled; /* the last event iteration asked for another one */
 } gt_state;
@@ -75,6 +79,10 @@ struct gt_instance {
     int logging[GT_LOG_CATEGORIES];
     int parameters_stale, outputs_stale, factors_stale;
     int stepping; /* in a step: modes hold up to events */
+    int counted;  /* events since counted_since, s, of one step */
+    double counted_since;
+    int closing;  /* at its end, where samples wait for the next one */
+    int sampling; /* values just before an instant are asked for: what turns there has not turned */
     const double *a[GT_ARRAYS + 1];
     double c[GT_ROOM(GT_HOISTED)], w[GT_ROOM(GT_WORK)], y[GT_ROOM(GT_OUTPUTS)];
     double matrices[GT_ROOM(GT_MATRICES)]; /* factored Jacobians of the blocks, one after another */
@@ -133,6 +141,20 @@ static void gt_point_at(gt_instance *it, const double *time, const double *x) {
     it->a[1] = x;
 }
 
+/* Keep what events change, or go back to what was kept. */
+static void gt_keep_before(gt_instance *it, int back) {
+    gt_earlier *before = &it->now.before;
+#define GT_COPY(kept, now, size) memcpy(back ? (void *)(now) : (void *)(kept), back ? (kept) : (now), size)
+    GT_COPY(before->held, it->now.u + GT_INPUTS, GT_STEPPING * sizeof(double));
+    GT_COPY(before->x, it->now.x, sizeof before->x);
+    GT_COPY(before->m, it->now.m, sizeof before->m);
+    GT_COPY(before->rest, it->now.rest, sizeof before->rest);
+    GT_COPY(before->ticks, it->now.ticks, sizeof before->ticks);
+    GT_COPY(before->holds, it->now.holds, sizeof before->holds);
+#undef GT_COPY
+    if (back) it->now.ended = 0, it->now.stale = it->outputs_stale = 1;
+}
+
 static void gt_reset(gt_instance *it) {
     memset(&it->now, 0, sizeof it->now);
 #if GT_DELAYS
@@ -149,7 +171,7 @@ static void gt_reset(gt_instance *it) {
     it->now.tolerance = GT_TOLERANCE;
     it->now.stale = 1;
     it->mode = GT_INSTANTIATED;
-    it->stepping = 0;
+    it->stepping = it->closing = it->sampling = 0;
     it->time = 0;
     it->parameters_stale = it->outputs_stale = it->factors_stale = 1;
     it->dt = 0;

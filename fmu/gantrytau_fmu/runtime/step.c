@@ -5,6 +5,9 @@
 #endif
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LEAST_LOOK 1e-4     /* of a communication step: shorter slips may be missed */
+#define GT_QUARTER 1.6         /* rad: what angles in margins may turn in one step */
+#define GT_LESS_THAN_HALF 2.   /* rad: what they may have turned when it ends */
+#define GT_PACED 1e-3          /* of a step: what one counts that is short for the sake of angles */
 #define GT_LOCATED 1e-13       /* s: how exactly an event is placed in time, beside rounding */
 
 static double gt_error_norm(const gt_instance *it, const double *x, const double *next, const double *error) {
@@ -151,8 +154,10 @@ static int gt_slipped(gt_instance *it, double t, const double *x, double size, d
 static double gt_overlooked(gt_instance *it, double t, const double *x, double size, double span, const gt_gaps *first,
                             const gt_gaps *last, gt_status *status) {
     double share = 1;
-    if (!GT_TURNS || *status != GT_OK || size <= GT_LEAST_LOOK * span) return 1;
-    share = gt_dip(size, first, last);
+    if (!GT_TURNS || *status != GT_OK) return 1;
+    if (size * last->pace > GT_LESS_THAN_HALF && size > 10 * GT_SHORTEST * span) share = fmax(0.1, GT_QUARTER / (size * last->pace));
+    else if (size <= GT_LEAST_LOOK * span) return 1;
+    else share = gt_dip(size, first, last);
     if (share == 1 && gt_strays(it, t, size, x, it->k[GT_FIRST_RATES], first, last)) share = 0.5;
     if (share < 1) *status = gt_move(it, t, x);
     return share;
@@ -165,13 +170,14 @@ static double gt_next_size(double h, double size, double norm, int last, int rej
 }
 
 /* Integrate to `end`, or to an event before; *event tells which. */
-static gt_status gt_integrate(gt_instance *it, double end, int *count, int *event) {
+static gt_status gt_integrate(gt_instance *it, double end, int *event) {
     double error[GT_ROOM(GT_STATES)], x[GT_ROOM(GT_STATES)];
     const double span = end - it->now.time, shortest = fmax(GT_SHORTEST * span, 4.5e-16 * fabs(end));
     double h = it->now.size > 0 ? it->now.size : span;
     gt_spare spare;
     gt_ahead here, there;
     gt_status status = gt_prepare(it);
+    double count = 0;
     int rejected = 0;
     *event = 0;
     if (GT_FRICTIONS && status == GT_OK) status = gt_find_spare(it, span, &spare);
@@ -181,11 +187,13 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
 #if GT_DELAYS
         h = fmin(h, it->memory.shortest);
 #endif
+        const int paced = GT_TURNS && h * here.gaps.pace >= GT_QUARTER;
+        if (paced) h = GT_QUARTER / here.gaps.pace;
         const int last = h >= rest * (1 - 1e-9);
         const double size = last ? rest : h > 0.5 * rest ? 0.5 * rest : h, next = last ? end : t + size;
         double norm, share;
         int turned;
-        if (++*count > GT_MOST_STEPS) return gt_too_many(it, t);
+        if ((count += paced ? GT_PACED : 1) > GT_MOST_STEPS) return gt_too_many(it, t);
         memcpy(x, it->now.x, GT_STATES * sizeof(double));
         norm = gt_try_step(it, t, size, x, it->next, error) == GT_OK ? gt_error_norm(it, x, it->next, error) : INFINITY;
         turned = norm <= 1 && GT_SIDES ? gt_turned_at(it, next) : -1;
@@ -205,7 +213,8 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
         }
 #endif
         if (GT_INDICATORS && status == GT_OK) status = gt_look_ahead(it, &there);
-        if (GT_INDICATORS && status == GT_OK && there.least < 0) {
+        share = gt_overlooked(it, t, x, size, span, &here.gaps, &there.gaps, &status);
+        if (GT_INDICATORS && status == GT_OK && share == 1 && there.least < 0) {
             *event = 1;
             status = gt_locate(it, t, size, x, here.least, there.least);
 #if GT_DELAYS
@@ -213,7 +222,6 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
 #endif
             return status;
         }
-        share = gt_overlooked(it, t, x, size, span, &here.gaps, &there.gaps, &status);
         if (share == 1 && gt_slipped(it, t, x, size, span, &spare, &status)) share = 0.5;
         if (share < 1) {
             rejected = 1;
@@ -234,47 +242,57 @@ static gt_status gt_integrate(gt_instance *it, double end, int *count, int *even
 }
 
 /* All that happens at the present time. */
-static gt_status gt_handle_events(gt_instance *it, int *events) {
-    int again = 1;
-    while (again) {
-        gt_event_info info;
+static gt_status gt_handle_events(gt_instance *it) {
+    gt_event_info info;
+    do {
         const gt_status status = gt_update(it, &info);
         if (status != GT_OK) return status;
-        again = info.again;
-        *events += again;
-        if (*events > GT_MOST_EVENTS)
-            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, the last of %s at time = %.9g s; take "
-                          "a shorter step or a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS, it->last_event,
-                          it->now.time);
-    }
+        if (it->now.time - it->counted_since > GT_CROWDED_TIME) {
+            it->counted = 0;
+            it->counted_since = it->now.time;
+        }
+        it->counted += info.again;
+        if (it->counted > GT_MOST_EVENTS)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s of one communication step, the last of %s at time = "
+                          "%.9g s; take a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS,
+                          GT_CROWDED_TIME, it->last_event, it->now.time);
+    } while (info.again);
     return GT_OK;
+}
+
+/* What happens at the end of a step. Samples wait for the inputs of the next one, and are taken of what was before. */
+static gt_status gt_finish(gt_instance *it) {
+    double periods[GT_ROOM(GT_CLOCKS)];
+    int due[GT_ROOM(GT_CLOCKS)];
+    gt_status status;
+    if (!GT_MODES && !GT_WHENS) return GT_OK;
+    it->closing = it->now.waiting = gt_find_due(it, periods, due);
+    if (it->closing) gt_keep_before(it, 0);
+    status = gt_handle_events(it);
+    it->closing = 0;
+    return status;
 }
 
 static gt_status gt_step(gt_instance *it, double time, double size, double *reached) {
     const double end = time + size;
     double turn = INFINITY;
-    int count = 0, events = 0, event = 0;
+    int event = 0;
     gt_status status = GT_OK;
     if (!(size > 4.5e-16 * fabs(end)))
         return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: found a step of %g s at time = %.9g s, expected one that a number of that size can "
                       "tell", GT_NAME, size, time);
     it->now.time = time;
     it->stepping = 1;
-    if (GT_CLOCKS && it->now.first) {
-        memcpy(it->now.u + GT_INPUTS, it->now.first_held, GT_STEPPING * sizeof(double));
-        memcpy(it->now.x, it->now.first_x, sizeof it->now.x);
-        memcpy(it->now.holds, it->now.first_holds, sizeof it->now.holds);
-        it->now.ended = 0;
-        memset(it->now.ticks, 0, sizeof it->now.ticks);
-        it->now.stale = it->outputs_stale = 1;
-    }
-    it->now.first = 0;
+    it->counted = 0;
+    it->counted_since = time;
+    if (it->now.waiting) gt_keep_before(it, 1);
+    it->now.waiting = 0;
 #if GT_DELAYS
     status = gt_begin_past(it);
 #endif
     while (status == GT_OK) {
         double next;
-        if (GT_CLOCKS || GT_MODES || GT_WHENS) status = gt_handle_events(it, &events);
+        if (GT_CLOCKS || GT_MODES || GT_WHENS) status = gt_handle_events(it);
         if (it->now.ended) break;
         if (status == GT_OK) status = gt_next_turn(it, &turn);
         next = fmin(GT_CLOCKS ? gt_next_sample(it, end) : INFINITY, turn);
@@ -283,9 +301,10 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
         if (status == GT_OK) status = gt_begin_piece(it);
         next = fmin(next, gt_next_arrival(&it->memory, it->now.time));
 #endif
-        if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &count, &event);
+        if (status == GT_OK) status = gt_integrate(it, fmin(next, end), &event);
         if (!event && it->now.time >= end) break;
     }
+    if (status == GT_OK && !it->now.ended) status = gt_finish(it);
     it->stepping = 0;
     if (status != GT_OK && !it->now.stale) gt_step_back(it);
     it->time = it->now.time;

@@ -17,10 +17,12 @@
 #define GT_LEFT 10          /* times the tolerance: what may be left of a margin that is not reached */
 #define GT_ROUNDING 1.8e-15 /* the noise of a margin in units of its terms: ROUNDING of simulation/events/margins.py */
 
-typedef struct { double values[GT_ROOM(GT_TURNS)], rates[GT_ROOM(GT_TURNS)], noise[GT_ROOM(GT_TURNS)]; } gt_margins;
+/* Behind the rates of the margins stands that of the fastest angle in them, in rad/s. */
+typedef struct { double values[GT_ROOM(GT_TURNS)], rates[GT_TURNS + 1], noise[GT_ROOM(GT_TURNS)]; } gt_margins;
 
-/* How far each switch is from its next turn: below zero its mode does not hold. Two of one that counts. */
-typedef struct { double left[GT_ROOM(GT_GAPS)], rates[GT_ROOM(GT_GAPS)], noise[GT_ROOM(GT_GAPS)]; } gt_gaps;
+/* How far each switch is from its next turn: below zero its mode does not hold. Two of one that counts. pace: of the fastest
+ * angle, rad/s. */
+typedef struct { double left[GT_ROOM(GT_GAPS)], rates[GT_ROOM(GT_GAPS)], noise[GT_ROOM(GT_GAPS)], pace; } gt_gaps;
 
 /* The direction of the motion at the present point into dt, dx, dz; dz stays zero where it is not determined. */
 static void gt_along_motion(gt_instance *it, const double *rates) {
@@ -45,6 +47,7 @@ static gt_status gt_look(gt_instance *it, gt_margins *found) {
     double both[GT_ROOM(2 * GT_TURNS)], rates[GT_ROOM(GT_STATES)], spacing;
     gt_status status = gt_refresh(it);
     int i;
+    found->rates[GT_TURNS] = 0;
     if (status != GT_OK || !GT_TURNS) return status;
     gt_rates(it->a, rates, it->w);
     gt_along_motion(it, rates);
@@ -65,6 +68,7 @@ static gt_status gt_look(gt_instance *it, gt_margins *found) {
 static void gt_find_gaps(const gt_instance *it, const gt_margins *margins, gt_gaps *found) {
     const double *modes = it->now.m + GT_FRICTIONS;
     int i, more = GT_TURNS;
+    found->pace = isfinite(margins->rates[GT_TURNS]) ? margins->rates[GT_TURNS] : 0;
     for (i = 0; i < GT_TURNS; i++) {
         const double sign = gt_turn_counts[i] ? 1 : 2 * modes[i] - 1;
         found->left[i] = sign * margins->values[i] - (gt_turn_counts[i] ? modes[i] : 0);
@@ -85,16 +89,19 @@ static gt_status gt_look_at_gaps(gt_instance *it, gt_gaps *found) {
     return status;
 }
 
-/* The modes just after the present instant: where a margin is zero, its rate decides. */
+/* The modes just after the present instant: where a margin is zero, its rate decides, or, for samples, it has not turned. */
 static void gt_following(const gt_instance *it, const gt_margins *at, double *modes) {
     int i, more = GT_TURNS;
     for (i = 0; i < GT_TURNS; i++) {
         const double slack = fmax(it->now.slack[i], gt_turn_counts[i] ? it->now.slack[more++] : 0);
         const double value = at->values[i], whole = gt_turn_counts[i] ? nearbyint(value) : 0;
+        const double kept = it->now.m[GT_FRICTIONS + i];
         /* as near as a crossing is located, so that what turns round there is not left behind it */
         const double late = GT_LATE + GT_LATE_BY_TIME * fabs(it->now.time);
         const double near = GT_NEAR * at->noise[i] + late * fabs(at->rates[i]) + 1.5 * slack;
-        if (fabs(value - whole) <= near && at->rates[i] != 0)
+        if (it->sampling && fabs(value - whole) <= near && (!gt_turn_counts[i] || kept == whole || kept == whole - 1))
+            modes[i] = kept;
+        else if (fabs(value - whole) <= near && at->rates[i] != 0)
             modes[i] = gt_turn_counts[i] ? whole - (at->rates[i] < 0) : at->rates[i] > 0;
         else
             modes[i] = gt_turn_counts[i] ? floor(value) : gt_turn_closed[i] ? value >= 0 : value > 0;
@@ -285,7 +292,9 @@ static int gt_strays(gt_instance *it, double t, double size, const double *x, co
         for (i = 0; i < GT_GAPS; i++) {
             const double g0 = first->left[i], g1 = last->left[i], g = middle.left[i];
             const double expected = 0.5 * (g0 + g1) + 0.125 * size * (first->rates[i] - last->rates[i]);
-            if (g < -middle.noise[i] || fabs(g - expected) > GT_STRAYS * fmax(g0, g1) + 4 * middle.noise[i]) strays = 1;
+            const double largest = fmax(fabs(g0), fabs(g1));
+            if (g < -middle.noise[i] && g1 >= -last->noise[i]) strays = 1;
+            if (fabs(g - expected) > GT_STRAYS * largest + 4 * middle.noise[i]) strays = 1;
         }
     it->sink = sink;
     it->now = kept;
@@ -297,7 +306,7 @@ static int gt_strays(gt_instance *it, double t, double size, const double *x, co
 /* Where a step of that size has failed: whether a margin that falls to zero may be why, with no more left of it than the
  * tolerance; then the states are put just behind it by the shortest way. */
 static int gt_put_behind(gt_instance *it, double size) {
-    double slopes[GT_ROOM(GT_TURNS)], along[GT_ROOM(GT_STATES)], sum;
+    double slopes[GT_TURNS + 1], along[GT_ROOM(GT_STATES)], sum;
     gt_gaps gaps;
     int i, j, k, more, put = 0;
     if (!GT_TURNS || gt_look_at_gaps(it, &gaps) != GT_OK) return 0;

@@ -122,10 +122,14 @@ class Changes:
         trail.held[k] = held
 
     def behind_inputs(self, k: int) -> int:
-        """From the place before a jump of inputs to that behind it, which is returned."""
+        """From the place before a jump of inputs to that behind it, which is returned, with the modes that samples see."""
         trail = self.trail
         trail.x[k + 1], trail.z[k + 1], trail.held[k + 1] = trail.x[k], trail.z[k], trail.held[k]
         trail.z[k + 1] = self._settled(k + 1)
+        if len(self.coordinates.switches):
+            modes = self.coordinates.switches.following(self.margins(np.array([k + 1])), self.modes(k))
+            if not np.array_equal(modes, self.modes(k)):
+                self._agree(k + 1, modes)
         return k + 1
 
     def turn(self, k: int, *, by_states: bool = False) -> int:

@@ -129,13 +129,17 @@ class Switches:
         """Where margins turn: at the nearest whole number, if they count, else at zero."""
         return np.where(self._counts, np.round(margins), 0.0)
 
-    def following(self, margins: Margins) -> np.ndarray:
-        """The modes just after one place: where a margin is zero, its rate decides."""
+    def following(self, margins: Margins, before: np.ndarray | None = None) -> np.ndarray:
+        """The modes just after one place: where a margin is zero, its rate decides, or those `before` stay."""
         values, rates, noise = margins.values[0], margins.rates[0], margins.noise[0]
         whole = self.whole(values)
         rest = values - whole
         turning = (np.abs(rest) <= noise) & (rates != 0)
         after = np.where(self._counts, whole - (rates < 0), rates > 0)
+        if before is not None:
+            after = np.where(
+                self._counts & (before != whole), whole - 1, np.where(self._counts, whole, before)
+            )
         return np.where(turning, after, self.written(values))
 
     def gaps(self, margins: Margins, modes: np.ndarray) -> Margins:

@@ -1,5 +1,6 @@
 """One passage of a model that samples, from a place to the next: a step of its motion, then new values of what is due."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,8 +16,8 @@ class Passage:
     """The function of a passage: (y, u) -> (y behind it, e3, e5), and the algebraics just before what is due, if any.
 
     y: states, what is held, discretes, modes; u: time and step, s, the start of the interval in which the step lies, which
-    held variables are due behind it (1 or 0), and the values and slopes of the sampled inputs in it, and behind it; e3, e5:
-    estimates of the error of the states, divided by the step.
+    held variables are due behind it (1 or 0), the values and slopes of the sampled inputs in it, and behind it, and whether
+    they jump there; e3, e5: estimates of the error of the states, divided by the step.
     instructions: of the rates of its stages; by_held: modes that follow from what is held, which change at instants only.
     """
 
@@ -37,11 +38,19 @@ def passage(coordinates: Coordinates) -> Passage:
     w = ca.vertcat(inputs, own)
     far, e3, e5 = one_step(lambda at, state: equations.rates(state, at, begin, w), t, x, h)
     by_held = _following_held(coordinates)
-    before = ca.vertcat(later, own)
+    jump, before = ca.MX.sym("jump"), ca.vertcat(later, own)
     z = equations.algebraics(far, t + h, t + h, before)
+    behind = _behind_jumps(coordinates, by_held)
+    if behind is not None:
+        before = ca.if_else(jump, behind(far, z, t + h, before), before)
+        z = equations.algebraics(far, t + h, t + h, before)
+        led_on = (
+            ca.norm_inf(behind(far, z, t + h, before) - before) > 0
+        )  # modes and unknowns lead to others again
+        far = far + ca.if_else(ca.logic_and(jump, led_on), math.nan, 0.0)
     renewal = _renewal(coordinates, by_held)(far, z, t + h, before, due)
     y = ca.vertcat(x, own)
-    u = ca.vertcat(t, h, begin, due, inputs, later)
+    u = ca.vertcat(t, h, begin, due, inputs, later, jump)
     found = [ca.vertcat(far, renewal), e3, e5, *([z] if coordinates.algebraics else [])]
     instructions = len(TIMES) * equations.instructions
     return Passage(ca.Function("passage", [y, u], found), instructions, by_held)
@@ -93,6 +102,21 @@ def _renewal(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function:
         known[modes + k] = mode
     own = ca.densify(known[sampled:, :])
     return ca.Function("renewal", [coordinates.x, coordinates.z, time, w, due], [own], {"cse": True})
+
+
+def _behind_jumps(coordinates: Coordinates, by_held: Sequence[int]) -> ca.Function | None:
+    """(x, z, t, w) -> w with the modes that follow from inputs which have jumped, as samples see them; None without such."""
+    sampled, first = 2 * len(coordinates.sampled), coordinates.w.numel() - len(coordinates.switches)
+    w, jumping = ca.SX(coordinates.w), ca.vertcat(coordinates.w[:sampled, :], coordinates.z)
+    for k, turn in enumerate(coordinates.switches.turns):
+        if k not in by_held and ca.depends_on(turn.margin, jumping):
+            (w[first + k],) = ca.substitute([turn.value], [coordinates.w, coordinates.t0], [w, time])
+            jumping = ca.vertcat(jumping, coordinates.w[first + k])
+    if jumping.numel() == sampled + coordinates.z.numel():
+        return None
+    return ca.Function(
+        "behind", [coordinates.x, coordinates.z, time, coordinates.w], [ca.densify(w)], {"cse": True}
+    )
 
 
 def _following_held(coordinates: Coordinates) -> tuple[int, ...]:

@@ -148,9 +148,12 @@ class Sampler:
         inner = np.arange(interval.size) - np.repeat(np.cumsum(parts) - parts, parts)
         h, begin = (np.diff(t) / np.maximum(parts, 1))[interval], t[interval]
         behind = interval + 1 + np.append(parts[1:] == 0, False)[interval]
-        due = trail.due[places[behind]] & (inner == parts[interval] - 1)[:, None]
+        last = (inner == parts[interval] - 1)[:, None]
+        due, jumps = trail.due[places[behind]] & last, (t[behind] == t[behind - 1])[:, None] & last
         w = trail.rows(places)[:, :half]
-        return np.hstack([np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[behind]])
+        return np.hstack(
+            [np.stack([begin + inner * h, h, begin], axis=1), due, w[interval], w[behind], jumps]
+        )
 
     def _error(self, found: StepsTaken, h: np.ndarray) -> np.ndarray:
         """Estimates of the errors of the steps, in tolerances; inf where they are not finite."""

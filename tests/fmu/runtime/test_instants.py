@@ -3,9 +3,28 @@
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, Input, Model, Parameter, Real, connect, der, sampled, sin, time
+from gantrytau import (
+    Discrete,
+    Fixed,
+    Input,
+    Model,
+    Parameter,
+    Real,
+    Samples,
+    connect,
+    der,
+    fmin,
+    if_else,
+    pre,
+    sampled,
+    simulate,
+    sin,
+    time,
+    when,
+)
 from gantrytau.mechanics import translational
 from gantrytau_fmu import cosimulate
+from gantrytau_fmu.systems.run_fmu import run_fmu
 from tests.fmu.exported import export
 from tests.fmu.runtime.raw_calls import ERROR, OK
 
@@ -160,3 +179,37 @@ def test_a_sampled_component_gets_functions_of_time_at_the_beginning_of_its_step
     # at an instant the result has what was held until then
     latest = np.maximum(np.ceil(found.time / 0.004 - 1e-9) - 1, 0) * 0.004
     assert found["a.y"] == pytest.approx(5 + latest, abs=1e-12)
+
+
+class Instants(Model):
+    """Switches 8 times a second, acts at 1 s by x and at 2 s by time, and samples what acts, behind a limit of r."""
+
+    r = Input(start=0.0, description="input")
+    x = Real(start=0.0, fixed=True, description="time that has passed")
+    y = Real(start=0.0, fixed=True, description="time with the sine above a half")
+    n = Discrete(0.0, description="rises")
+    m = Discrete(0.0, description="1 behind 1 s, 11 behind 2 s")
+    seen = Real(start=0.0, description="m before an instant, and r up to 1")
+
+    def equations(self):
+        fast = sin(50 * self.x) > 0.5
+        yield der(self.x) == 1
+        yield der(self.y) == if_else(fast, 1.0, 0.0)
+        yield when(fast, self.n == pre(self.n) + 1)
+        yield when(self.x >= 1.0, self.m == pre(self.m) + 1).elsewhen(time >= 2.0, self.m == pre(self.m) + 10)
+        yield sampled(self.seen, 10 * self.m + fmin(self.r, 1.0), period=0.5)
+
+
+@pytest.mark.parametrize(("version", "solver"), [(2, "dopri5"), (3, "rodas4")])
+def test_steps_of_a_second_lose_nothing_and_act_at_their_ends(tmp_path, version, solver):
+    r = Samples([0.0, 2.0], [0.2, 5.0], kind="constant")
+    export(Instants(), tmp_path / "instants.fmu", version, solver=solver)
+    found = run_fmu(tmp_path / "instants.fmu", stop=3.0, step=1.0, inputs={"r": r})
+    rises = np.floor((50 * found.time - np.arcsin(0.5)) / (2 * np.pi)) + 1
+    assert found["n"].tolist() == rises.tolist()
+    assert found.final("y") == pytest.approx(24 * (2 * np.pi / 3) / 50, abs=1e-9)  # a third of each period
+    assert found["m"].tolist() == [0.0, 1.0, 11.0, 11.0]  # once, where samples are due as well
+    # m before an instant; r, as soon as it jumps, up to 1
+    assert found["seen"].tolist() == [0.2, 0.2, 10.2, 111.0]
+    same = simulate(Instants(), stop=3.0, points=7, inputs={"r": r})
+    assert [same.at(t, "seen") for t in (0.75, 1.25, 2.25)] == [0.2, 0.2, 11.0]

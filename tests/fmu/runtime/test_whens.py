@@ -241,7 +241,7 @@ def test_what_is_sampled_makes_conditions_true_at_the_same_instant(tmp_path, ver
     fmu = export(Counts(), tmp_path / "counts.fmu", version)
     with fmu.new().begin() as run:
         x = 0.0
-        for k, (u, a, b) in enumerate([(2, 1, 0), (2, 1, 0), (0, 1, 0), (3, 2, 1), (0, 2, 1), (9, 3, 1)]):
+        for k, (u, a, b) in enumerate([(0, 0, 0), (2, 1, 0), (0, 1, 0), (3, 2, 1), (0, 2, 1), (9, 3, 1)]):
             run["u"] = u
             run.instance.step(0.1 * k, 0.1)
             x += 0.1 * a + (10 if k == 3 else 0)

@@ -198,7 +198,7 @@ def test_machine_code_gives_the_same_numbers_bit_by_bit(monkeypatch):
     start = coordinates.dae.start
     held = [start[n] for n in coordinates.held] + [0.0] * len(coordinates.switches)
     y = np.array([*(start[n] for n in coordinates.states), *held])
-    told = np.array([0.0, 0.004, 0.0, *(1.0 for _ in coordinates.held)])
+    told = np.array([0.0, 0.004, 0.0, *(1.0 for _ in coordinates.held), 0.0])
     random = np.random.default_rng(5)
     for _ in range(20):
         point = y * random.uniform(0.99, 1.01, y.size)
