@@ -15,6 +15,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.impulses import Impulses
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
@@ -41,7 +42,7 @@ class Coordinates:
     that the model samples; known: expression of each known symbol in time and w
     (values of the sampled inputs, their slopes, values of the held variables, of the discretes, modes of the switches);
     substitutions: all symbols in terms of (t, x, z, w), one after the other; pieces: the equations with modes; renewal:
-    what the held variables become at an instant; rounds: what whens do; sizes: typical magnitudes of the states, powers
+    what the held variables become at an instant; impulses: jumps where a switch turns, if there may be; rounds: what whens do; sizes: typical magnitudes of the states, powers
     of two; all 1 if there are none.
     """
 
@@ -63,6 +64,7 @@ class Coordinates:
     pivots: ca.SX
     pieces: InModes
     switches: Switches
+    impulses: Impulses | None
     rounds: Rounds
     dropped: ca.Function
     renewal: ca.SX

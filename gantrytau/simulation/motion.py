@@ -13,6 +13,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.events.impulses import Impulses, turning
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.events.rounds import rounds_of
@@ -42,7 +43,8 @@ def all_coordinates(
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
-    moving = [rates, column(solved.residuals), column(pieces.conditions), *levels]
+    bent = turning(dae, pieces)
+    moving = [rates, column(solved.residuals), column(pieces.conditions), column(bent), *levels]
     wanted = [
         *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
@@ -52,12 +54,13 @@ def all_coordinates(
     ]
     found = substitution.inserted(wanted)
     turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
-    ode, algebraic, conditions, *rest = outside.inserted(found)
+    ode, algebraic, conditions, _, *rest = outside.inserted(found)
     invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
     w = ca.vertcat(w, *(turn.mode for turn in turns))
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)
     divisors = _divisors(solved, pivots, list(last), list(highest))
+    impulses = Impulses(dae, pieces, substitution, outside, tuple(arguments), states) if bent else None
     return Coordinates(
         dae=dae,
         states=states,
@@ -77,6 +80,7 @@ def all_coordinates(
         pivots=pivots,
         pieces=pieces,
         switches=switches,
+        impulses=impulses,
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,

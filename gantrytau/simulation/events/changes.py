@@ -12,6 +12,7 @@ import numpy as np
 from gantrytau.errors import SolveError
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import JUST_BEHIND
+from gantrytau.simulation.events.impulses import Infinite
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.rounds import MOST, Made
 from gantrytau.simulation.events.sticking import HOLDS, WHENS
@@ -40,6 +41,7 @@ class Changes:
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
         self.events: list[float] = []  # times at which states made something switch
         self.ended = ""  # what a when said that ended the run
+        self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
         self._acted: dict[
@@ -133,7 +135,8 @@ class Changes:
                     k = k + 1
                 self._agree(k, modes)
                 sampled = trail.due[left].any()  # results have the side behind only
-                if k > left and not sampled and switches.jumped(self.point(left), self.point(k)):
+                jumped = self._thrown or switches.jumped(self.point(left), self.point(k))
+                if k > left and not sampled and jumped:
                     trail.show(left, k)
             if by_states:
                 self._count(self.modes(k), first, float(trail.t[k]))
@@ -295,10 +298,11 @@ class Changes:
 
         errors: by which margins are known at least.
         """
+        before = self.point(k)
         tried = [self.modes(k).copy()]
         while not any(np.array_equal(modes, old) for old in tried):
             tried.append(modes)
-            modes = self._led_to(k, modes, errors)
+            modes = self._led_to(k, modes, errors, before)
             if np.array_equal(modes, tried[-1]):
                 return
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
@@ -308,19 +312,49 @@ class Changes:
             for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
                 modes = tried[0].copy()
                 modes[changing] = choice
-                if np.array_equal(self._led_to(k, modes, errors), modes):
+                if np.array_equal(self._led_to(k, modes, errors, before), modes):
                     return
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
-    def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float) -> np.ndarray:
-        """The modes that belong to the margins of a place that has these modes."""
+    def _led_to(
+        self, k: int, modes: np.ndarray, errors: np.ndarray | float, before: Point
+    ) -> np.ndarray:
+        """The modes that belong to the margins of a place that gets these modes; before: what it was before them."""
         trail, places = self.trail, slice(k, k + 1)
         self.modes(k)[:] = modes
+        if self.coordinates.impulses:
+            self._throw(k, before)
         if self.coordinates.dae.flat.slips:
             self._slide_on(k, trail.held[k, self._slip_modes(k)] == 0)
         trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
         trail.z[k] = self._settled(k)
         return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
+
+    def _throw(self, k: int, before: Point) -> None:
+        """Let the states of a place jump with what its modes turn; at the start what is told of them holds behind it."""
+        coordinates, trail, (x, z, t, w) = self.coordinates, self.trail, before
+        assert coordinates.impulses is not None
+        self._thrown = False
+        if k == 0:
+            trail.x[k] = coordinates.followed(x, t, trail.inputs(k))
+            return
+        turned = np.flatnonzero(self.modes(k) != w[w.size - self.modes(k).size :])
+        behind = trail.inputs(k).copy()
+        slips = coordinates.dae.flat.slips
+        if slips:  # the impulse of a friction is finite as its force is
+            behind[coordinates.slips.modes] = 1.0
+        try:
+            found = coordinates.impulses.behind(before, behind, self.span)
+        except Infinite as error:
+            raise run_ends.infinite(coordinates.dae, t, self.conditions(turned), error) from None
+        except np.linalg.LinAlgError:
+            raise run_ends.undetermined_jump(coordinates.dae, t, self.conditions(turned)) from None
+        self._thrown = found is not None
+        if found is None:
+            return
+        trail.x[k] = found
+        if slips:
+            self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
 
     def _count(self, modes: np.ndarray, before: np.ndarray, t: float) -> None:
         """SolveError if states made something switch too often."""
