@@ -11,7 +11,7 @@ For a mechanism these are G v+ = its rate and M (v+ - v-) = G^T p, for a circuit
 the turn: impacts are plastic. Where J changes by the jump itself, it is led along the jump in proportion to b.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,6 +19,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.events.modes import InModes
@@ -50,6 +51,87 @@ def turning(dae: Translated, pieces: InModes) -> list[ca.SX]:
 
 
 @dataclass(frozen=True, eq=False)
+class Levels:
+    """The equations of jumps in reduced symbols; residuals: with modes; known: names of what is known."""
+
+    dae: Translated
+    residuals: Mapping[Key, ca.SX]
+    known: tuple[str, ...]
+
+    @cached_property
+    def names(self) -> list[str]:
+        """All symbols, each variable with its derivatives."""
+        return self.dae.indexed.unknown_symbols()
+
+    @cached_property
+    def orders(self) -> np.ndarray:
+        """d_j."""
+        return np.array(list(self.dae.indexed.orders.values()), dtype=int)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """c_i."""
+        return np.array(self.dae.indexed.counts, dtype=int)
+
+    @cached_property
+    def ends(self) -> np.ndarray:
+        """Places of the highest derivatives among all symbols."""
+        return np.cumsum(self.orders + 1) - 1
+
+    def places(self, k: int) -> np.ndarray:
+        """Those of the derivatives that jump at a level, -1 for impulses."""
+        return np.where(self.orders >= k, self.ends - k, -1)
+
+    @cached_property
+    def symbols(self) -> tuple[ca.SX, ca.SX]:
+        """All symbols, and what is known."""
+        named = self.dae.reduced.chains.named
+        return column([named(n) for n in self.names]), column([named(n) for n in self.known])
+
+    @cached_property
+    def jacobian(self) -> ca.SX:
+        """J."""
+        last = column([self.residuals[i, int(c)] for i, c in enumerate(self.counts)])
+        return ca.jacobian(last, self.symbols[0][self.ends.tolist()])
+
+    def lacking(self, k: int) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Of the constraints of a level: residuals, sizes of their terms, and of the rates of these in 1/s; else zeros."""
+        rows = [self.residuals[i, int(c) - k] if c >= k else ca.SX(0) for i, c in enumerate(self.counts)]
+        residual, terms, rates = column(rows), ca.SX(len(rows), 1), ca.fabs(ca.jacobian(column(rows), time))
+        for symbols, names in zip(self.symbols, (self.names, self.known), strict=True):
+            slopes = ca.fabs(ca.jacobian(residual, symbols))
+            place = {name: i for i, name in enumerate(names)}
+            further = [place.get(derivative_name(b, order + 1), -1) for b, order in map(split_derivative, names)]
+            terms += slopes @ ca.fabs(symbols)
+            rates += slopes @ ca.fabs(column([symbols[i] if i >= 0 else ca.SX(0) for i in further]))
+        return residual, terms, rates
+
+    def balance(self, k: int, jumps: Sequence[ca.SX], steps: ca.SX) -> ca.SX:
+        """What derivatives of jumps at other levels add to the impulses of equations below a level.
+
+        jumps: by level, from the first; steps: by how much what is known jumps.
+        """
+        found, place = ca.SX(self.counts.size, 1), {name: i for i, name in enumerate(self.known)}
+        for c in sorted({int(c) for c in self.counts if c < k}):
+            along = [ca.SX(0)] * len(self.names)
+            for j, (end, top) in enumerate(zip(self.ends.tolist(), self.orders.tolist(), strict=True)):
+                for higher in range(k + 1, len(jumps) + 1):
+                    order = top - c - (higher - k)
+                    if order >= 0:
+                        along[end - top + order] = jumps[higher - 1][j]
+            driven = [ca.SX(0)] * len(self.known)
+            for i, name in enumerate(self.known):
+                base, order = split_derivative(name)
+                lower = order - k + c
+                driven[i] = steps[place[derivative_name(base, lower)]] if lower >= 0 else ca.SX(0)
+            rows = [i for i, count in enumerate(self.counts.tolist()) if count == c]
+            first = column([self.residuals[i, 0] for i in rows])
+            way = ca.vertcat(*along, *driven)
+            found[rows] = -ca.jtimes(first, ca.vertcat(*self.symbols), way) if way.numel() else ca.SX(len(rows), 1)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
 class Impulses:
     """The jumps of a model; arguments: x, z, time, t0, w, to which `way` and then `outside` lead; x: names of the states."""
 
@@ -61,79 +143,53 @@ class Impulses:
     x: tuple[str, ...]
 
     @cached_property
-    def _names(self) -> list[str]:
-        return self.dae.indexed.unknown_symbols()
+    def levels(self) -> Levels:
+        """Their equations."""
+        return Levels(self.dae, self.pieces.residuals, tuple(self.pieces.known))
 
     @cached_property
-    def _known(self) -> list[str]:
-        return list(self.pieces.known)
+    def most(self) -> int:
+        """The highest level at which something may jump."""
+        known = (order for _, order in map(split_derivative, self.levels.known))
+        return int(self.levels.counts.max(initial=0)) + max(known, default=0)
 
     @cached_property
-    def _orders(self) -> np.ndarray:
-        return np.array(list(self.dae.indexed.orders.values()), dtype=int)
-
-    @cached_property
-    def _counts(self) -> np.ndarray:
-        return np.array(self.dae.indexed.counts, dtype=int)
-
-    @cached_property
-    def _ends(self) -> np.ndarray:
-        """Places of the highest derivatives among all symbols."""
-        return np.cumsum(self._orders + 1) - 1
-
-    @cached_property
-    def _states(self) -> np.ndarray:
-        places = {n: k for k, n in enumerate(self._names)}
+    def states(self) -> np.ndarray:
+        """Places of the states among all symbols."""
+        places = {n: k for k, n in enumerate(self.levels.names)}
         return np.array([places[n] for n in self.x], dtype=int)
 
-    def _function(self, expressions: Sequence[ca.SX]) -> ca.Function:
+    def _function(self, expressions: Sequence[ca.SX], more: Sequence[ca.SX] = ()) -> ca.Function:
         """Expressions of symbols and of what is known, as a function of these at a point."""
         table = self.dae.table
-        steady = [(table.symbols[n], ca.SX(table.values[n])) for n in table.independent]
-        found = self.outside.inserted(Substitution(tuple(steady)).inserted([ca.densify(e) for e in expressions]))
-        named = self.dae.reduced.chains.named
-        symbols = [column([named(n) for n in names]) for names in (self._names, self._known)]
-        return ca.Function("impulses", [*self.arguments[2:], *symbols], found, {"cse": True})
+        steady = Substitution(tuple((table.symbols[n], ca.SX(table.values[n])) for n in table.independent))
+        found = self.outside.inserted(steady.inserted([ca.densify(e) for e in expressions]))
+        return ca.Function("jumps", [*self.arguments[2:], *self.levels.symbols, *more], found, {"cse": True})
 
     @cached_property
-    def _symbols(self) -> ca.Function:
+    def symbols(self) -> ca.Function:
         """All symbols, and what is known, at a point."""
-        named = self.dae.reduced.chains.named
-        rows = [column([named(n) for n in self._names]), column(list(self.pieces.known.values()))]
+        rows = [self.levels.symbols[0], column(list(self.pieces.known.values()))]
         found = self.outside.inserted(self.way.inserted([ca.densify(e) for e in rows]))
         return ca.Function("symbols", list(self.arguments), found, {"cse": True})
 
     @cached_property
-    def _keys(self) -> list[tuple[int, int]]:
-        return [(i, m) for i, count in enumerate(self._counts.tolist()) for m in range(count)]
+    def jacobian(self) -> ca.Function:
+        """J as a function."""
+        return self._function([self.levels.jacobian])
 
     @cached_property
-    def _lower(self) -> ca.Function:
-        """Residuals of the constraints below the highest derivatives, and their slopes by symbols, what is known and time."""
-        named, residual = self.dae.reduced.chains.named, column([self.pieces.residuals[key] for key in self._keys])
-        symbols, known = (column([named(n) for n in names]) for names in (self._names, self._known))
-        return self._function([residual, *(ca.jacobian(residual, by) for by in (symbols, known, time))])
+    def _at_levels(self) -> dict[int, ca.Function]:
+        return {}
 
-    @cached_property
-    def _rates(self) -> tuple[np.ndarray, np.ndarray]:
-        """Places of the derivatives of all symbols and of what is known, of their own where there is none."""
-        found = []
-        for names in (self._names, self._known):
-            places = {name: k for k, name in enumerate(names)}
-            rates = (derivative_name(b, order + 1) for b, order in map(split_derivative, names))
-            found.append(np.array([places.get(rate, k) for k, rate in enumerate(rates)], dtype=int))
-        return found[0], found[1]
-
-    @cached_property
-    def _slopes(self) -> ca.Function:
-        """The Jacobian of the highest derivatives, and those of the equations as they are by all symbols and what is known."""
-        named, residuals = self.dae.reduced.chains.named, self.pieces.residuals
-        last = column([residuals[i, c] for i, c in enumerate(self._counts.tolist())])
-        first = column([residuals[i, 0] for i in range(self._counts.size)])
-        symbols, known = (column([named(n) for n in names]) for names in (self._names, self._known))
-        return self._function(
-            [ca.jacobian(last, symbols[self._ends.tolist()]), ca.jacobian(first, symbols), ca.jacobian(first, known)]
-        )
+    def at_level(self, k: int) -> ca.Function:
+        """What constraints lack, and what other levels add, by jumps (n, levels) and steps of what is known."""
+        if k not in self._at_levels:
+            jumps = ca.SX.sym("jumps", self.levels.counts.size, self.most)
+            steps = ca.SX.sym("steps", len(self.levels.known))
+            balance = self.levels.balance(k, ca.horzsplit(jumps), steps)
+            self._at_levels[k] = self._function([*self.levels.lacking(k), balance], [jumps, steps])
+        return self._at_levels[k]
 
     def behind(self, point: Point, w: np.ndarray, span: float) -> np.ndarray | None:
         """The states behind a turn at a point that leads to w, None if nothing jumps; span: of the run, s.
@@ -141,9 +197,9 @@ class Impulses:
         Infinite where they cannot be, LinAlgError where they are not determined.
         """
         jump = _Jump(self, point, w, span)
-        for k in range(jump.most, 0, -1):
+        for k in range(self.most, 0, -1):
             jump.lead(k)
-        return jump.y[self._states] if jump.found else None
+        return jump.y[self.states] if jump.found else None
 
 
 class _Jump:
@@ -151,78 +207,52 @@ class _Jump:
 
     def __init__(self, impulses: Impulses, point: Point, w: np.ndarray, span: float):
         x, z, t, before = point
-        self.of, self.span, self.found = impulses, span, False
-        self.old, self._known = (np.array(f).ravel() for f in impulses._symbols(x, z, t, t, before))
-        self.y, self._at = self.old.copy(), (t, t)
-        self._w = w
-        self._before, self._was = before, self._known
-        known = np.array(impulses._symbols(x, z, t, t, w)[1]).ravel()
-        self._driven = self._steps_of_known(known)
-        self._known = known
-        depth = int(impulses._counts.max(initial=0))
-        most = depth + max((order for _, order in map(split_derivative, impulses._known)), default=0)
-        self.most = most if self._driven else depth if self._turned().any() else 0
-        self._jumps: dict[int, np.ndarray] = {}
+        self.of, self.levels, self.span, self.found = impulses, impulses.levels, span, False
+        y, known = (np.array(f).ravel() for f in impulses.symbols(x, z, t, t, before))
+        behind = np.array(impulses.symbols(x, z, t, t, w)[1]).ravel()
+        self._old, self._new = (t, t, before, y, known), (t, t, w)
+        self.y, self._known = y.copy(), behind
+        self._jumps = np.zeros((self.levels.counts.size, impulses.most))
+        self._steps = self._steps_of_known(known, behind)
 
-    def _steps_of_known(self, behind: np.ndarray) -> dict[tuple[str, int], float]:
-        """By how much what is known jumps, by variable and order, where its derivative is known as well."""
-        found, rates = {}, self.of._rates[1]
-        steps = behind - self._known
-        sizes = np.abs(self._known) + self.span * np.maximum(np.abs(self._known), np.abs(behind))[rates]
-        for k in np.flatnonzero((np.abs(steps) > NOTHING * sizes) & (rates != np.arange(rates.size))):
-            found[split_derivative(self.of._known[k])] = float(steps[k])
-        return found
+    def _steps_of_known(self, known: np.ndarray, behind: np.ndarray) -> np.ndarray:
+        """By how much what is known jumps, where its derivative is known as well."""
+        place, steps = {name: k for k, name in enumerate(self.levels.known)}, behind - known
+        for k, (base, order) in enumerate(map(split_derivative, self.levels.known)):
+            rate = place.get(derivative_name(base, order + 1), -1)
+            size = abs(known[k]) + self.span * max(abs(known[rate]), abs(behind[rate]))
+            if rate < 0 or abs(steps[k]) <= NOTHING * size:
+                steps[k] = 0.0
+        return steps
 
-    def _turned(self) -> np.ndarray:
-        """What the constraints lack here behind the turn, but for what they lacked before it."""
-        before = self.of._lower(*self._at, self._before, self.old, self._was)
-        behind = self.of._lower(*self._at, self._w, self.y, self._known)
-        found = np.array(behind[0] - before[0]).ravel()
-        terms = np.zeros(found.size)
-        for y, known, (_, *slopes) in ((self.old, self._was, before), (self.y, self._known, behind)):
-            along = [np.abs(a) + self.span * np.abs(a[k]) for a, k in zip((y, known), self.of._rates, strict=True)]
-            for by, size in zip(slopes, (*along, np.array([self.span])), strict=True):
-                terms += np.abs(np.array(by)) @ size
-        return np.where(np.abs(found) > NOTHING * terms, found, 0.0)
+    def _lacking(self, k: int) -> np.ndarray:
+        """b."""
+        function, more = self.of.at_level(k), (self._jumps, self._steps)
+        before, terms_before, rates_before, _ = (np.array(f).ravel() for f in function(*self._old, *more))
+        here = function(*self._new, self.y, self._known, *more)
+        behind, terms, rates, others = (np.array(f).ravel() for f in here)
+        noise = NOTHING * (terms + terms_before + self.span * (rates + rates_before))
+        lack = behind - before  # what it lacked before the turn already is the error of the integration
+        return others - np.where(np.abs(lack) > noise, lack, 0.0)
 
-    def _slopes(self, y: np.ndarray) -> list[np.ndarray]:
-        return [np.array(f) for f in self.of._slopes(*self._at, self._w, y, self._known)]
+    def _jacobian(self, y: np.ndarray) -> np.ndarray:
+        return np.array(self.of.jacobian(*self._new, y, self._known))
 
     def lead(self, k: int) -> None:
         """Give the derivatives d - k the values behind the turn."""
-        counts, orders, ends = self.of._counts, self.of._orders, self.of._ends
-        lacking = {key: -f for key, f in zip(self.of._keys, self._turned(), strict=True)}
-        b = np.array([lacking.get((i, int(c) - k), 0.0) for i, c in enumerate(counts)])
-        if self._jumps or self._driven:
-            b += self._from_others(k)
+        b = self._lacking(k)
         if not b.any():
             return
-        places = np.where(orders >= k, ends - k, -1)
-        y, jump = self._led(b, places)
+        y, jump = self._led(b, self.levels.places(k))
         self._check(k, jump, b)
-        self.y, self._jumps[k], self.found = y, jump, True
-
-    def _from_others(self, k: int) -> np.ndarray:
-        """The balance of what jumps at other levels, and of what is known and jumps, for equations below a level."""
-        _, by_symbols, by_known = self._slopes(self.y)
-        counts, orders, starts = self.of._counts, self.of._orders, self.of._ends - self.of._orders
-        b = np.zeros(counts.size)
-        for i in np.flatnonzero(counts < k):
-            for higher, jump in self._jumps.items():
-                order = orders - counts[i] - (higher - k)
-                there = order >= 0
-                b[i] -= by_symbols[i, (starts + order)[there]] @ jump[there]
-            for column_, name in enumerate(self.of._known):
-                base, n = split_derivative(name)
-                b[i] -= by_known[i, column_] * self._driven.get((base, n - k + int(counts[i])), 0.0)
-        return b
+        self.y, self._jumps[:, k - 1], self.found = y, jump, True
 
     def _led(self, b: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where J Y = b leads, in as many parts as it takes (Runge and Kutta), and Y of the whole way."""
         own, found = places >= 0, list[np.ndarray]()
 
         def slope(y: np.ndarray) -> np.ndarray:
-            return np.linalg.solve(self._slopes(y)[0], b)
+            return np.linalg.solve(self._jacobian(y), b)
 
         def same(some: np.ndarray, others: np.ndarray) -> bool:
             return bool(np.all(np.abs(some - others) <= SAME * np.abs(some).max(initial=0.0)))
@@ -253,23 +283,20 @@ class _Jump:
 
     def _check(self, k: int, jump: np.ndarray, b: np.ndarray) -> None:
         """Infinite for what would have to be more than an impulse, and for impulses in laws that are not linear in them."""
-        of = self.of
-        jacobian = self._slopes(self.y)[0]
-        terms = np.abs(np.linalg.inv(jacobian)) @ np.abs(b)
-        acting = np.abs(jump) > ROUNDING * terms
-        names = list(of.dae.indexed.orders)
-
-        def words(which: np.ndarray, order: np.ndarray) -> list[str]:
-            return [of.dae.spoken(derivative_name(names[j], int(order[j]))) for j in np.flatnonzero(which)]
-
-        moved = words(acting & (of._orders >= k), of._orders - k)
-        beyond = acting & (k >= of._orders + 2)
-        if beyond.any():
-            raise Infinite(moved, words(beyond, 0 * of._orders))
+        dae, levels = self.of.dae, self.levels
+        jacobian = self._jacobian(self.y)
+        acting = np.abs(jump) > ROUNDING * (np.abs(np.linalg.inv(jacobian)) @ np.abs(b))
+        names = list(dae.indexed.orders)
+        jumping = [levels.known[i] for i in np.flatnonzero(self._steps)]
+        moved = np.flatnonzero(acting & (levels.orders >= k))
+        jumping += [derivative_name(names[j], int(levels.orders[j]) - k) for j in moved]
+        spoken = [dae.spoken(name) for name in jumping]
+        beyond = np.flatnonzero(acting & (k >= levels.orders + 2))
+        if beyond.size:
+            raise Infinite(spoken, [names[j] for j in beyond])
         there = self.y.copy()
-        there[of._ends[acting]] += jump[acting]
-        bent = np.abs((self._slopes(there)[0] - jacobian) @ jump) > ROUNDING * (np.abs(jacobian) @ np.abs(jump))
-        rows = bent & (of._counts == 0)
-        if rows.any():
-            laws = [of.dae.reduced.equations[i].name for i in np.flatnonzero(rows)]
-            raise Infinite(moved, laws, law=True)
+        there[levels.ends[acting]] += jump[acting]
+        bent = np.abs((self._jacobian(there) - jacobian) @ jump) > ROUNDING * (np.abs(jacobian) @ np.abs(jump))
+        laws = np.flatnonzero(bent & (levels.counts == 0))
+        if laws.size:
+            raise Infinite(spoken, [dae.reduced.equations[i].name for i in laws], law=True)
