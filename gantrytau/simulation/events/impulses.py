@@ -40,14 +40,20 @@ class Infinite(Exception):
 
 
 def turning(dae: Translated, pieces: InModes) -> list[ca.SX]:
-    """The modes that stand below the highest derivatives: where these turn, there may be impulses."""
-    found = [e for (i, m), e in pieces.residuals.items() if m < dae.indexed.counts[i]]
+    """The modes of the equations, if some stand below the highest derivatives: where these turn, there may be impulses."""
+    below = [e for (i, m), e in pieces.residuals.items() if m < dae.indexed.counts[i]]
     for name, e in pieces.known.items():
         base, order = split_derivative(name)
         if derivative_name(base, order + 1) in pieces.known:
-            found.append(e)
-    names = {leaf.name() for leaf in ca.symvar(column(found))} if found else set[str]()
-    return [turn.mode for turn in pieces.switched.switches if turn.mode.name() in names]
+            below.append(e)
+    modes = {turn.mode.name() for turn in pieces.switched.switches}
+
+    def within(expressions: Sequence[ca.SX]) -> set[str]:
+        return modes & {leaf.name() for leaf in ca.symvar(column(expressions))}
+
+    found = within(below)
+    found |= within(list(pieces.residuals.values())) if found else set()
+    return [turn.mode for turn in pieces.switched.switches if turn.mode.name() in found]
 
 
 @dataclass(frozen=True, eq=False)
