@@ -15,7 +15,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.events.at_places import at_places
-from gantrytau.simulation.events.impulses import Impulses
+from gantrytau.simulation.events.impulses import Impulses, turning
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
@@ -42,7 +42,7 @@ class Coordinates:
     that the model samples; known: expression of each known symbol in time and w
     (values of the sampled inputs, their slopes, values of the held variables, of the discretes, modes of the switches);
     substitutions: all symbols in terms of (t, x, z, w), one after the other; pieces: the equations with modes; renewal:
-    what the held variables become at an instant; impulses: jumps where a switch turns, if there may be; rounds: what whens do; sizes: typical magnitudes of the states, powers
+    what the held variables become at an instant; rounds: what whens do; sizes: typical magnitudes of the states, powers
     of two; all 1 if there are none.
     """
 
@@ -64,12 +64,16 @@ class Coordinates:
     pivots: ca.SX
     pieces: InModes
     switches: Switches
-    impulses: Impulses | None
     rounds: Rounds
     dropped: ca.Function
     renewal: ca.SX
     conditioning: Conditioning
     sizes: tuple[float, ...] = ()
+
+    @property
+    def arguments(self) -> list[ca.SX]:
+        """Symbols of a point."""
+        return [self.x, self.z, time, self.t0, self.w]
 
     @property
     def discretes(self) -> tuple[str, ...]:
@@ -95,7 +99,7 @@ class Coordinates:
     @cached_property
     def delayed(self) -> RatesAlong:
         """What is delayed, and its rates."""
-        return RatesAlong(self.rounds.past, [self.x, self.z, time, self.t0, self.w], self.ode, self.algebraic)
+        return RatesAlong(self.rounds.past, self.arguments, self.ode, self.algebraic)
 
     def integrator(
         self,
@@ -160,9 +164,8 @@ class Coordinates:
     @property
     def renewed(self) -> ca.Function:
         """The renewal as a function of x, z, t, t0, w."""
-        arguments = [self.x, self.z, time, self.t0, self.w]
         found = ca.densify(self.renewal)
-        return self.kept("renewed", lambda: ca.Function("renewed", arguments, [found], {"cse": True}))
+        return self.kept("renewed", lambda: ca.Function("renewed", self.arguments, [found], {"cse": True}))
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""
@@ -235,8 +238,7 @@ class Coordinates:
 
     def not_finite(self, point: Point, step: float) -> list[str]:
         """Names of what has no finite value at a point, or where its rates lead within a time, s."""
-        arguments = [self.x, self.z, time, self.t0, self.w]
-        function = ca.Function("rates", arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
+        function = ca.Function("rates", self.arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
         x, z, t, w = point
         rates = np.array(function(x, z, t, t, w)[0]).ravel()
         for share in (0.0, 1e-6, 1e-3, 1.0):
@@ -249,16 +251,20 @@ class Coordinates:
         return []
 
     @property
+    def impulses(self) -> Impulses | None:
+        """What jumps where a switch turns, if anything may."""
+        own = Impulses(self.dae, self.pieces, self.substitutions, tuple(self.arguments), self.states)
+        return self.kept("impulses", lambda: own if turning(self.dae, self.pieces) else None)
+
+    @property
     def slips(self) -> Slips:
         """The frictions that may stick."""
         return self.kept("slips", self._made_slips)
 
     def _made_slips(self) -> Slips:
         constraints = self.invariants[-1] if self.invariants else ca.SX(0, 1)
-        arguments = [self.x, self.z, time, self.t0, self.w]
-        return slips_of(
-            self.dae, self.inserted, arguments, constraints, 2 * len(self.sampled) + len(self.held)
-        )
+        first = 2 * len(self.sampled) + len(self.held)
+        return slips_of(self.dae, self.inserted, self.arguments, constraints, first)
 
     @property
     def _levels(self) -> list[tuple[list[int], ca.Function, tuple[str, ...]]]:
@@ -365,8 +371,7 @@ class Coordinates:
 
     def _made_algebra(self) -> ca.Function:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
-        arguments = [self.x, self.z, time, self.t0, self.w]
-        return ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+        return ca.Function("algebra", self.arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -380,7 +385,7 @@ class Coordinates:
                 return found
         if self.pivots.numel() == 0:
             return []
-        function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
+        function = ca.Function("pivots", self.arguments, [ca.densify(self.pivots)])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
         return depending(here, before, [e.name for e in self.dae.reduced.equations])
 

@@ -13,7 +13,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
-from gantrytau.simulation.events.impulses import Impulses, turning
+from gantrytau.simulation.events.impulses import turning
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.events.rounds import rounds_of
@@ -43,8 +43,8 @@ def all_coordinates(
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
-    bent = turning(dae, pieces)
-    moving = [rates, column(solved.residuals), column(pieces.conditions), column(bent), *levels]
+    turned = column(turning(dae, pieces))
+    moving = [rates, column(solved.residuals), column(pieces.conditions), turned, *levels]
     wanted = [
         *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
@@ -59,8 +59,6 @@ def all_coordinates(
     w = ca.vertcat(w, *(turn.mode for turn in turns))
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)
-    divisors = _divisors(solved, pivots, list(last), list(highest))
-    impulses = Impulses(dae, pieces, substitution, outside, tuple(arguments), states) if bent else None
     return Coordinates(
         dae=dae,
         states=states,
@@ -80,11 +78,15 @@ def all_coordinates(
         pivots=pivots,
         pieces=pieces,
         switches=switches,
-        impulses=impulses,
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
+        conditioning=Conditioning(
+            *_constraints(dae, invariants, states),
+            _divisors(solved, pivots, last, highest),
+            matrices,
+            arguments,
+        ),
     )
 
 
@@ -124,7 +126,7 @@ def _highest_blocks(
 
 
 def _divisors(
-    solved: SolvedBlocks, pivots: ca.SX, equations: Sequence[Key], unknowns: Sequence[str]
+    solved: SolvedBlocks, pivots: ca.SX, equations: Collection[Key], unknowns: Collection[str]
 ) -> list[ca.SX]:
     """What is divided by where an equation is solved for one unknown."""
     rows, columns = ({key: k for k, key in enumerate(keys)} for keys in (equations, unknowns))

@@ -123,28 +123,27 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
 def infinite(dae: Translated, t: float, conditions: Sequence[str], error: Infinite) -> SolveError:
     """What turns at time t takes more than an impulse."""
     jumping, beyond = ", ".join(error.jumping[:4]), ", ".join(error.infinite[:4])
-    if error.law:
-        return SolveError(
-            f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and {jumping} would jump by impulses that stand in "
-            f"{beyond}, a law that is not linear in them: it says nothing of impulses. Smooth what turns, as tanh(x / small) "
-            "for sign(x), or make the law linear; .result holds the motion up to there",
-            time=t,
-            equations=error.infinite,
-        )
+    law = (
+        f"jump by impulses that stand in {beyond}, a law that is not linear in them. Make the law linear, or smooth what "
+        "turns, as tanh(x / small) for sign(x)"
+    )
+    place = (
+        f"jump at once, for which {beyond} would be infinite, more than an impulse. Expected positions that go on, whose "
+        "speeds may jump: let what is prescribed rise within a time, as by a ramp, or put a spring or damper between"
+    )
     return SolveError(
-        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and {jumping} would jump at once, for which {beyond} "
-        "would be infinite, more than an impulse. Expected positions that go on, whose speeds may jump: let what is prescribed "
-        "rise within a time, as by a ramp, or put a spring or damper between; .result holds the motion up to there",
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and {jumping} would {law if error.law else place}; "
+        ".result holds the motion up to there",
         time=t,
-        equations=[],
+        equations=error.infinite if error.law else [],
     )
 
 
 def undetermined_jump(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
     """The equations behind what turns at time t do not determine what jumps."""
     return SolveError(
-        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and the equations behind it do not determine what jumps "
-        "there, expected a mass or an inertia for every motion on both sides; .result holds the motion up to there",
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and the equations behind it do not determine what "
+        "jumps, expected a mass or an inertia for every motion on both sides; .result holds the motion up to there",
         time=t,
         equations=[],
     )

@@ -21,7 +21,7 @@ from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.fmu_starts import Starts, starts_of
-from gantrytau_fmu.code.impulses import ImpulseFormulas, impulses_of, turning_names
+from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas, impulses_of, turning_names
 from gantrytau_fmu.code.jumps import JumpFormulas, jump_of
 from gantrytau_fmu.code.switching import Switching, WithModes, switching, written
 
@@ -45,9 +45,9 @@ class Formulas:
 
     careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
     expression by name; samples: new values of `held`, clocks: which period each follows; jump: what whens do; impulses: what
-    jumps where a switch turns; friction: speed and breakaway force by turns; delays: what is known from the past, past: expressions of which it is that,
-    delay_times: in s; roots: name of an unknown -> what comes to zero where its closed form ends; switching: what turns
-    at events.
+    jumps where a switch turns; friction: speed and breakaway force by turns; delays: what is known from the past, past:
+    expressions of which it is that, delay_times: in s; roots: name of an unknown -> what comes to zero where its closed form
+    ends; switching: what turns at events.
     """
 
     dae: Dae
@@ -128,13 +128,11 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
     past = at_once(found.past)
     everything = [system.ode, system.residuals, *wanted, *updates, *rows, friction, *initial, *past]
     jump, impulses = jump_of(found, at_once), impulses_of(found, turning.outside, at_once)
-    thrown = (impulses.symbols, impulses.jacobian, *impulses.by_level)
-    differentiated = _input_derivatives(dae, column([*everything, *jump.everything, *thrown]))
+    differentiated = _input_derivatives(dae, column([*everything, *jump.everything, *impulses.everything]))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
-    forces = [_symbol(system, f.force) for f in frictions]
     instants = (*(s.name for s in sampled), *flat.discretes, *(d.name for d in flat.delays))
     held = [_symbol(system, n) for n in instants]
-    blocks = _blocks(system, frictions, forces, rows)
+    blocks = _blocks(system, frictions, [_symbol(system, f.force) for f in frictions], rows)
     arrays = {
         "t": system.time,
         "x": system.x,
@@ -143,11 +141,9 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         "p": system.p,
         "m": column([*slides, turning.modes]),
         "e": jump.rose,
-        "y": impulses.y,
-        "j": impulses.j,
+        **impulses.arrays,
     }
     periods, clocks = _clocks(system, sampled)
-    starts = starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays)
     return Formulas(
         dae=dae,
         arrays=arrays,
@@ -169,7 +165,7 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         frictions=tuple(f.force for f in frictions),
         friction=friction,
         roots=_roots(system, turning),
-        starts=starts,
+        starts=starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays),
         parameters=system.parameters,
         margins=column(at_once([m for b in dae.blocks if b.solution is not None for m in b.margins])),
         switching=turning,

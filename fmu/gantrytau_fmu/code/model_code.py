@@ -10,7 +10,7 @@ from gantrytau_fmu.code.c_functions import CFunction, c_function
 from gantrytau_fmu.code.contents import Contents
 from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
-from gantrytau_fmu.code.impulses import ImpulseFormulas
+from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas
 from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph
 from gantrytau_fmu.code.operations import number_text
 

@@ -316,23 +316,28 @@ class Changes:
                     return
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
-    def _led_to(
-        self, k: int, modes: np.ndarray, errors: np.ndarray | float, before: Point
-    ) -> np.ndarray:
+    def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float, before: Point) -> np.ndarray:
         """The modes that belong to the margins of a place that gets these modes; before: what it was before them."""
         trail, places = self.trail, slice(k, k + 1)
         self.modes(k)[:] = modes
-        if self.coordinates.impulses:
+        coordinates, thrown = self.coordinates, self.coordinates.impulses is not None
+        if thrown:
             self._throw(k, before)
-        if self.coordinates.dae.flat.slips:
+        if coordinates.dae.flat.slips:
             self._slide_on(k, trail.held[k, self._slip_modes(k)] == 0)
-        trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
+        drifted, z, t, w = (a.copy() for a in self.columns(np.array([k])))
+        trail.x[k] = coordinates.project(drifted, t, w)[0]
+        if thrown:  # margins are known no better than constraints
+            looks = [
+                coordinates.switches.look(x, z, t, w, self.sizes).values for x in (drifted, trail.x[places])
+            ]
+            errors = np.maximum(errors, 1.1 * np.abs(looks[1] - looks[0])[0])
         trail.z[k] = self._settled(k)
-        return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
+        return coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 
     def _throw(self, k: int, before: Point) -> None:
         """Let the states of a place jump with what its modes turn; at the start what is told of them holds behind it."""
-        coordinates, trail, (x, z, t, w) = self.coordinates, self.trail, before
+        coordinates, trail, (x, _, t, w) = self.coordinates, self.trail, before
         assert coordinates.impulses is not None
         self._thrown = False
         if k == 0:
@@ -350,10 +355,8 @@ class Changes:
         except np.linalg.LinAlgError:
             raise run_ends.undetermined_jump(coordinates.dae, t, self.conditions(turned)) from None
         self._thrown = found is not None
-        if found is None:
-            return
-        trail.x[k] = found
-        if slips:
+        trail.x[k] = x if found is None else found
+        if slips and found is not None:
             self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
 
     def _count(self, modes: np.ndarray, before: np.ndarray, t: float) -> None:

@@ -25,7 +25,9 @@ from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.singular_poses import Point
 
-NOTHING = 1e-12  # of the terms and what they change by in the run: less is how well a turn is located, no jump
+NOTHING = (
+    1e-12  # of the terms and what they change by in the run: less is how well a turn is located, no jump
+)
 ROUNDING = 1e-9  # of its terms: a smaller impulse is none
 PARTS = (4, 8, 16, 32, 64, 128)  # of a jump, until twice as many lead to the same place
 SAME = 1e-11
@@ -107,7 +109,9 @@ class Levels:
         for symbols, names in zip(self.symbols, (self.names, self.known), strict=True):
             slopes = ca.fabs(ca.jacobian(residual, symbols))
             place = {name: i for i, name in enumerate(names)}
-            further = [place.get(derivative_name(b, order + 1), -1) for b, order in map(split_derivative, names)]
+            further = [
+                place.get(derivative_name(b, order + 1), -1) for b, order in map(split_derivative, names)
+            ]
             terms += slopes @ ca.fabs(symbols)
             rates += slopes @ ca.fabs(column([symbols[i] if i >= 0 else ca.SX(0) for i in further]))
         return residual, terms, rates
@@ -133,18 +137,21 @@ class Levels:
             rows = [i for i, count in enumerate(self.counts.tolist()) if count == c]
             first = column([self.residuals[i, 0] for i in rows])
             way = ca.vertcat(*along, *driven)
-            found[rows] = -ca.jtimes(first, ca.vertcat(*self.symbols), way) if way.numel() else ca.SX(len(rows), 1)
+            found[rows] = (
+                -ca.jtimes(first, ca.vertcat(*self.symbols), way) if way.numel() else ca.SX(len(rows), 1)
+            )
         return found
 
 
 @dataclass(frozen=True, eq=False)
 class Impulses:
-    """The jumps of a model; arguments: x, z, time, t0, w, to which `way` and then `outside` lead; x: names of the states."""
+    """The jumps of a model; arguments: x, z, time, t0, w, to which `ways` lead one after another, the last from modes that
+    are not kept; x: names of the states.
+    """
 
     dae: Translated
     pieces: InModes
-    way: Substitution
-    outside: Substitution
+    ways: tuple[Substitution, ...]
     arguments: tuple[ca.SX, ...]
     x: tuple[str, ...]
 
@@ -169,14 +176,15 @@ class Impulses:
         """Expressions of symbols and of what is known, as a function of these at a point."""
         table = self.dae.table
         steady = Substitution(tuple((table.symbols[n], ca.SX(table.values[n])) for n in table.independent))
-        found = self.outside.inserted(steady.inserted([ca.densify(e) for e in expressions]))
+        found = self.ways[-1].inserted(steady.inserted([ca.densify(e) for e in expressions]))
         return ca.Function("jumps", [*self.arguments[2:], *self.levels.symbols, *more], found, {"cse": True})
 
     @cached_property
     def symbols(self) -> ca.Function:
         """All symbols, and what is known, at a point."""
-        rows = [self.levels.symbols[0], column(list(self.pieces.known.values()))]
-        found = self.outside.inserted(self.way.inserted([ca.densify(e) for e in rows]))
+        found = [self.levels.symbols[0], column(list(self.pieces.known.values()))]
+        for way in self.ways:
+            found = way.inserted([ca.densify(e) for e in found])
         return ca.Function("symbols", list(self.arguments), found, {"cse": True})
 
     @cached_property
@@ -232,7 +240,7 @@ class _Jump:
         return steps
 
     def _lacking(self, k: int) -> np.ndarray:
-        """b."""
+        """B."""
         function, more = self.of.at_level(k), (self._jumps, self._steps)
         before, terms_before, rates_before, _ = (np.array(f).ravel() for f in function(*self._old, *more))
         here = function(*self._new, self.y, self._known, *more)
@@ -302,7 +310,9 @@ class _Jump:
             raise Infinite(spoken, [names[j] for j in beyond])
         there = self.y.copy()
         there[levels.ends[acting]] += jump[acting]
-        bent = np.abs((self._jacobian(there) - jacobian) @ jump) > ROUNDING * (np.abs(jacobian) @ np.abs(jump))
+        bent = np.abs((self._jacobian(there) - jacobian) @ jump) > ROUNDING * (
+            np.abs(jacobian) @ np.abs(jump)
+        )
         laws = np.flatnonzero(bent & (levels.counts == 0))
         if laws.size:
             raise Infinite(spoken, [dae.reduced.equations[i].name for i in laws], law=True)

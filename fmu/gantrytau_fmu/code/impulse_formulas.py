@@ -1,4 +1,4 @@
-"""What jumps in an FMU where a switch turns, in the symbols of the arrays: the equations of simulation/events/impulses.py."""
+"""What jumps in an FMU where a switch turns, in the symbols of the arrays: equations of simulation/events/impulses.py."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -30,6 +30,16 @@ class ImpulseFormulas:
     ends: tuple[int, ...] = ()
     states: tuple[int, ...] = ()
 
+    @property
+    def arrays(self) -> dict[str, ca.SX]:
+        """Symbols of its own, by array."""
+        return {"y": self.y, "j": self.j}
+
+    @property
+    def everything(self) -> tuple[ca.SX, ...]:
+        """All expressions."""
+        return self.symbols, self.jacobian, *self.by_level
+
 
 NONE = ImpulseFormulas(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1), ())
 
@@ -42,7 +52,9 @@ def turning_names(found: WithModes) -> frozenset[str]:
 def impulses_of(
     found: WithModes, outside: Substitution, at_once: Callable[[Sequence[ca.SX]], list[ca.SX]]
 ) -> ImpulseFormulas:
-    """outside: modes that are not kept; at_once: leads from reduced symbols to those of the arrays; where nothing can jump there are no formulas."""
+    """outside: modes that are not kept; at_once: leads from reduced symbols to those of the arrays. Where nothing can jump
+    there are no formulas.
+    """
     dae = found.dae
     if not turning_names(found):
         return NONE
@@ -54,7 +66,9 @@ def impulses_of(
     steps = ca.SX(len(known), 1)
     rows = [ca.vec(ca.densify(levels.jacobian))]
     rows += [ca.vertcat(*levels.lacking(k), levels.balance(k, columns, steps)) for k in range(1, most + 1)]
-    jacobian, *by_level = ca.substitute(outside.inserted([ca.densify(e) for e in rows]), [levels.symbols[0]], [y])
+    jacobian, *by_level = ca.substitute(
+        outside.inserted([ca.densify(e) for e in rows]), [levels.symbols[0]], [y]
+    )
     places = {name: i for i, name in enumerate(levels.names)}
     return ImpulseFormulas(
         symbols=ca.vertcat(*at_once(levels.symbols[0].elements())),
