@@ -213,12 +213,14 @@ class Run:
 
     def _too_wide(self, count: int) -> bool:
         """Whether places ahead lay too far apart to find everything that switches; if so, more are laid."""
+        trail, here, last = self.trail, self.done, self.trail.last
         starts = count if self.history else 1  # of the integrator
-        parts = (self.integrators.steps - STARTING * starts) // (STEPS_BETWEEN * count)
+        shortest = self.integrators.shorter or np.inf  # steps kept short say nothing
+        free = self.integrators.steps - (trail.t[here + count] - trail.t[here]) / shortest
+        parts = (free - STARTING * starts) // (STEPS_BETWEEN * count)
         if parts < 2 or not len(self.coordinates.switches):
             return False
-        trail, here, last = self.trail, self.done, self.trail.last
-        least = max(SHORT**2 * self.span, self.integrators.shorter or 0.0)  # steps kept short say nothing
+        least = max(SHORT**2 * self.span, self.integrators.shorter or 0.0)
         for k in reversed(range(here, min(here + max(count, REFINED), last))):
             times = np.linspace(trail.t[k], trail.t[k + 1], int(parts) + 1)[1:-1]
             if np.all(np.diff(times, prepend=trail.t[k], append=trail.t[k + 1]) > least):
