@@ -142,10 +142,7 @@ def _direction(rng: np.random.Generator, n: int) -> np.ndarray:
 
 def _started(name: str, values: np.ndarray, free: int | None) -> dict[str, Any]:
     """Variables of which all but one start where they are told."""
-    return {
-        f"{name}{i}": Real(**(dict(start=float(x)) if i == free else dict(start=float(x), fixed=True)))
-        for i, x in enumerate(values)
-    }
+    return {f"{name}{i}": Real(start=float(x), fixed=i != free) for i, x in enumerate(values)}
 
 
 def _way(rng: np.random.Generator) -> str:
@@ -264,7 +261,7 @@ def _pendulums(rng: np.random.Generator) -> ThrownMotion:
             yield masses[i] * der(der(y)) == up - masses[i] * GRAVITY
         yield from _said(self, way, signal)
 
-    def matrix(angles: np.ndarray) -> np.ndarray:
+    def matrix(angles: np.ndarray) -> Any:
         apart = angles[:, None] - angles[None]
         weights = below[np.maximum.outer(np.arange(n), np.arange(n))]
         return weights * np.outer(lengths, lengths) * np.exp(1j * apart)

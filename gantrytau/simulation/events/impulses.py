@@ -129,11 +129,11 @@ class Levels:
                     order = top - c - (higher - k)
                     if order >= 0:
                         along[end - top + order] = jumps[higher - 1][j]
-            driven = [ca.SX(0)] * len(self.known)
-            for i, name in enumerate(self.known):
-                base, order = split_derivative(name)
-                lower = order - k + c
-                driven[i] = steps[place[derivative_name(base, lower)]] if lower >= 0 else ca.SX(0)
+            below = (
+                derivative_name(b, n - k + c) if n >= k - c else ""
+                for b, n in map(split_derivative, self.known)
+            )
+            driven = [steps[place[name]] if name in place else ca.SX(0) for name in below]
             rows = [i for i, count in enumerate(self.counts.tolist()) if count == c]
             first = column([self.residuals[i, 0] for i in rows])
             way = ca.vertcat(*along, *driven)
@@ -240,7 +240,7 @@ class _Jump:
         return steps
 
     def _lacking(self, k: int) -> np.ndarray:
-        """B."""
+        """The right-hand side of a level."""
         function, more = self.of.at_level(k), (self._jumps, self._steps)
         before, terms_before, rates_before, _ = (np.array(f).ravel() for f in function(*self._old, *more))
         here = function(*self._new, self.y, self._known, *more)
@@ -310,9 +310,8 @@ class _Jump:
             raise Infinite(spoken, [names[j] for j in beyond])
         there = self.y.copy()
         there[levels.ends[acting]] += jump[acting]
-        bent = np.abs((self._jacobian(there) - jacobian) @ jump) > ROUNDING * (
-            np.abs(jacobian) @ np.abs(jump)
-        )
+        size = np.abs(jacobian) @ np.abs(jump)
+        bent = np.abs((self._jacobian(there) - jacobian) @ jump) > ROUNDING * size
         laws = np.flatnonzero(bent & (levels.counts == 0))
         if laws.size:
             raise Infinite(spoken, [dae.reduced.equations[i].name for i in laws], law=True)
