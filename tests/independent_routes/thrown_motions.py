@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from gantrytau import Input, Model, Real, der, fabs, fmin, if_else, limit, sign, table
+from gantrytau import Input, Model, Real, der, fabs, fmin, if_else, limit, sign, table, time
 
 END = 2.0  # s
 GRAVITY = 9.81
@@ -155,8 +155,7 @@ def _prescribed(way: str, signal: Signal) -> dict[str, Any]:
 
 def _said(self: Any, way: str, signal: Signal) -> Any:
     if way == "equation":
-        yield self.s == signal.write(self.clock)
-        yield der(self.clock) == 1
+        yield self.s == signal.write(time)
 
 
 def _masses(rng: np.random.Generator) -> ThrownMotion:
@@ -333,5 +332,4 @@ def _path(rng: np.random.Generator) -> ThrownMotion:
 
 
 def _model(own: dict[str, Any], way: str, signal: Signal) -> type[Model]:
-    clock = {"clock": Real(start=0.0, fixed=True)} if way == "equation" else {}
-    return type("Thrown", (Model,), dict(own, **_prescribed(way, signal), **clock))
+    return type("Thrown", (Model,), dict(own, **_prescribed(way, signal)))

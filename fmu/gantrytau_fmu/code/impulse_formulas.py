@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
 from gantrytau.compiler.alphabets import Substitution
 from gantrytau.language.symbols import split_derivative
@@ -15,20 +14,15 @@ from gantrytau_fmu.code.switching import WithModes
 @dataclass(frozen=True, eq=False)
 class ImpulseFormulas:
     """symbols: all variables with their derivatives, of the system; jacobian, by_level: in `y`, which stands for them, and
-    in jumps `j`, a column for each level; names, orders, counts, ends: of unknowns and equations as in Levels; states:
-    places in y.
+    in jumps `j`, a column for each level; states: places in y.
     """
 
+    levels: Levels
     symbols: ca.SX
     y: ca.SX
     j: ca.SX
     jacobian: ca.SX
     by_level: tuple[ca.SX, ...]
-    names: tuple[str, ...] = ()
-    orders: tuple[int, ...] = ()
-    counts: tuple[int, ...] = ()
-    ends: tuple[int, ...] = ()
-    states: tuple[int, ...] = ()
 
     @property
     def arrays(self) -> dict[str, ca.SX]:
@@ -40,8 +34,11 @@ class ImpulseFormulas:
         """All expressions."""
         return self.symbols, self.jacobian, *self.by_level
 
-
-NONE = ImpulseFormulas(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1), ())
+    @property
+    def states(self) -> list[int]:
+        """Places of the states in y."""
+        places = {name: i for i, name in enumerate(self.levels.names)}
+        return [places[n] for n in self.levels.dae.choice.states]
 
 
 def turning_names(found: WithModes) -> frozenset[str]:
@@ -56,33 +53,18 @@ def impulses_of(
     there are no formulas.
     """
     dae = found.dae
-    if not turning_names(found):
-        return NONE
     known = tuple(n for n in dae.symbols if split_derivative(n)[0] in set(dae.known))
     levels = Levels(dae, found.pieces.residuals, known)
+    if not turning_names(found):
+        nothing = ca.SX(0, 1)
+        return ImpulseFormulas(levels, nothing, nothing, nothing, nothing, ())
     most = int(levels.counts.max(initial=0))
     y, j = ca.SX.sym("y", len(levels.names)), ca.SX.sym("j", levels.counts.size * most)
     columns = ca.horzsplit(ca.reshape(j, levels.counts.size, most))
-    steps = ca.SX(len(known), 1)
     rows = [ca.vec(ca.densify(levels.jacobian))]
-    rows += [ca.vertcat(*levels.lacking(k), levels.balance(k, columns, steps)) for k in range(1, most + 1)]
-    jacobian, *by_level = ca.substitute(
-        outside.inserted([ca.densify(e) for e in rows]), [levels.symbols[0]], [y]
-    )
-    places = {name: i for i, name in enumerate(levels.names)}
-    return ImpulseFormulas(
-        symbols=ca.vertcat(*at_once(levels.symbols[0].elements())),
-        y=y,
-        j=j,
-        jacobian=jacobian,
-        by_level=tuple(by_level),
-        names=tuple(dae.indexed.orders),
-        orders=_integers(levels.orders),
-        counts=_integers(levels.counts),
-        ends=_integers(levels.ends),
-        states=tuple(places[n] for n in dae.choice.states),
-    )
-
-
-def _integers(values: np.ndarray) -> tuple[int, ...]:
-    return tuple(int(v) for v in values)
+    for k in range(1, most + 1):  # inputs do not say by how much they jump
+        rows.append(ca.vertcat(*levels.lacking(k), levels.balance(k, columns, ca.SX(len(known), 1))))
+    rows = outside.inserted([ca.densify(e) for e in rows])
+    jacobian, *by_level = ca.substitute(rows, [levels.symbols[0]], [y])
+    symbols = ca.vertcat(*at_once(levels.symbols[0].elements()))
+    return ImpulseFormulas(levels, symbols, y, j, jacobian, tuple(by_level))

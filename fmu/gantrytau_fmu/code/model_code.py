@@ -128,7 +128,7 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_PARAMETERS=len(formulas.parameters),
         GT_OUTPUTS=len(model.outputs),
         GT_LEVELS=len(formulas.impulses.by_level),
-        GT_UNKNOWNS=len(formulas.impulses.names),
+        GT_UNKNOWNS=formulas.impulses.j.numel() // max(len(formulas.impulses.by_level), 1),
         GT_SYMBOLS=formulas.impulses.y.numel(),
         GT_FRICTIONS=len(formulas.frictions),
         GT_TURNS=len(turns),
@@ -205,10 +205,10 @@ def _of_impulses(impulses: ImpulseFormulas) -> list[str]:
     levels = ", ".join(f"gt_level_{k}" for k in range(1, len(impulses.by_level) + 1))
     return [
         f"static void (*const gt_levels[])(const double *const *a, double *restrict r, double *restrict w) = {{{levels}}};",
-        _texts("gt_unknown_names", impulses.names),
-        _integers("gt_unknown_orders", impulses.orders),
-        _integers("gt_equation_counts", impulses.counts),
-        _integers("gt_unknown_ends", impulses.ends),
+        _texts("gt_unknown_names", impulses.levels.dae.indexed.orders),
+        _integers("gt_unknown_orders", impulses.levels.orders),
+        _integers("gt_equation_counts", impulses.levels.counts),
+        _integers("gt_unknown_ends", impulses.levels.ends),
         _integers("gt_state_symbols", impulses.states),
     ]
 
