@@ -12,7 +12,7 @@ from tests.independent_routes.test_cells import MODELS
 from tests.independent_routes.thrown_motions import END, ThrownMotion, random_thrown
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
-SHARE = 0.3  # of the random models
+SHARE = 0.25  # of the random models
 FMUS = 0.05
 TOLERANCE = 1e-10
 CLOSE = 1e5 * TOLERANCE  # of the size of the motion: three pendulums magnify errors

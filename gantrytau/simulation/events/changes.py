@@ -349,7 +349,7 @@ class Changes:
         if slips:  # the impulse of a friction is finite as its force is
             behind[coordinates.slips.modes] = 1.0
         try:
-            found = coordinates.impulses.behind(before, behind, self.span)
+            found = coordinates.impulses.behind(before, behind, self.span + abs(t))
         except Infinite as error:
             raise run_ends.infinite(coordinates.dae, t, self.conditions(turned), error) from None
         except np.linalg.LinAlgError:

@@ -206,7 +206,7 @@ class Impulses:
         return self._at_levels[k]
 
     def behind(self, point: Point, w: np.ndarray, span: float) -> np.ndarray | None:
-        """The states behind a turn at a point that leads to w, None if nothing jumps; span: of the run, s.
+        """The states behind a turn at a point that leads to w, None if nothing jumps; span: of times of the run, s.
 
         Infinite where they cannot be, LinAlgError where they are not determined.
         """
