@@ -15,7 +15,6 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.events.at_places import at_places
-from gantrytau.simulation.events.impulses import Impulses, turning
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.events.rounds import Rounds
@@ -249,12 +248,6 @@ class Coordinates:
             if bad.size:
                 return [self.dae.spoken(names[k]) for k in bad]
         return []
-
-    @property
-    def impulses(self) -> Impulses | None:
-        """What jumps where a switch turns, if anything may."""
-        own = Impulses(self.dae, self.pieces, self.substitutions, tuple(self.arguments), self.states)
-        return self.kept("impulses", lambda: own if turning(self.dae, self.pieces) else None)
 
     @property
     def slips(self) -> Slips:

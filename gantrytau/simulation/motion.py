@@ -43,8 +43,7 @@ def all_coordinates(
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
-    turned = column(turning(dae, pieces))
-    moving = [rates, column(solved.residuals), column(pieces.conditions), turned, *levels]
+    moving = [rates, column(solved.residuals), column(pieces.conditions), *levels, *turning(dae, pieces)]
     wanted = [
         *moving,
         ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values())))),
@@ -54,11 +53,12 @@ def all_coordinates(
     ]
     found = substitution.inserted(wanted)
     turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
-    ode, algebraic, conditions, _, *rest = outside.inserted(found)
-    invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
+    ode, algebraic, conditions, *rest = outside.inserted(found)
+    invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(moving) - 3 :]
     w = ca.vertcat(w, *(turn.mode for turn in turns))
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)
+    divisors = _divisors(solved, pivots, list(last), list(highest))
     return Coordinates(
         dae=dae,
         states=states,
@@ -81,12 +81,7 @@ def all_coordinates(
         rounds=rounds_of(dae, states, conditions, (substitution, outside), switches, arguments),
         dropped=ca.Function("dropped", [arguments[0], *arguments[2:]], [ca.densify(dropped)], {"cse": True}),
         renewal=renewed,
-        conditioning=Conditioning(
-            *_constraints(dae, invariants, states),
-            _divisors(solved, pivots, last, highest),
-            matrices,
-            arguments,
-        ),
+        conditioning=Conditioning(*_constraints(dae, invariants, states), divisors, matrices, arguments),
     )
 
 
@@ -126,7 +121,7 @@ def _highest_blocks(
 
 
 def _divisors(
-    solved: SolvedBlocks, pivots: ca.SX, equations: Collection[Key], unknowns: Collection[str]
+    solved: SolvedBlocks, pivots: ca.SX, equations: Sequence[Key], unknowns: Sequence[str]
 ) -> list[ca.SX]:
     """What is divided by where an equation is solved for one unknown."""
     rows, columns = ({key: k for k, key in enumerate(keys)} for keys in (equations, unknowns))

@@ -12,7 +12,7 @@ import numpy as np
 from gantrytau.errors import SolveError
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import JUST_BEHIND
-from gantrytau.simulation.events.impulses import Infinite
+from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.rounds import MOST, Made
 from gantrytau.simulation.events.sticking import HOLDS, WHENS
@@ -41,6 +41,10 @@ class Changes:
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
         self.events: list[float] = []  # times at which states made something switch
         self.ended = ""  # what a when said that ended the run
+        dae, pieces = coordinates.dae, coordinates.pieces
+        arguments = tuple(coordinates.arguments)
+        own = Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
+        self._impulses = coordinates.kept("impulses", lambda: own if turning(dae, pieces) else None)
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -320,14 +324,14 @@ class Changes:
         """The modes that belong to the margins of a place that gets these modes; before: what it was before them."""
         trail, places = self.trail, slice(k, k + 1)
         self.modes(k)[:] = modes
-        coordinates, thrown = self.coordinates, self.coordinates.impulses is not None
-        if thrown:
-            self._throw(k, before)
+        coordinates = self.coordinates
+        if self._impulses:
+            self._throw(k, before, self._impulses)
         if coordinates.dae.flat.slips:
             self._slide_on(k, trail.held[k, self._slip_modes(k)] == 0)
         drifted, z, t, w = (a.copy() for a in self.columns(np.array([k])))
         trail.x[k] = coordinates.project(drifted, t, w)[0]
-        if thrown:  # margins are known no better than constraints
+        if self._impulses:  # margins are known no better than constraints
             looks = [
                 coordinates.switches.look(x, z, t, w, self.sizes).values for x in (drifted, trail.x[places])
             ]
@@ -335,10 +339,9 @@ class Changes:
         trail.z[k] = self._settled(k)
         return coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 
-    def _throw(self, k: int, before: Point) -> None:
+    def _throw(self, k: int, before: Point, impulses: Impulses) -> None:
         """Let the states of a place jump with what its modes turn; at the start what is told of them holds behind it."""
         coordinates, trail, (x, _, t, w) = self.coordinates, self.trail, before
-        assert coordinates.impulses is not None
         self._thrown = False
         if k == 0:
             trail.x[k] = coordinates.followed(x, t, trail.inputs(k))
@@ -349,7 +352,7 @@ class Changes:
         if slips:  # the impulse of a friction is finite as its force is
             behind[coordinates.slips.modes] = 1.0
         try:
-            found = coordinates.impulses.behind(before, behind, self.span + abs(t))
+            found = impulses.behind(before, behind, self.span + abs(t))
         except Infinite as error:
             raise run_ends.infinite(coordinates.dae, t, self.conditions(turned), error) from None
         except np.linalg.LinAlgError:
