@@ -87,10 +87,21 @@ static gt_status gt_refuse_jump(gt_instance *it, const char *name, const char *w
     return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: at time = %.9g s %s turns, and %s %s", GT_NAME, it->now.time, gt_conditions[i], name, why);
 }
 
+/* J Y at the present symbols, and the sizes of its terms. */
+static void gt_times(gt_instance *it, const double *jump, double *product, double *size) {
+    int i, j;
+    gt_impulses(it->a, it->impulses, it->w);
+    for (i = 0; i < GT_UNKNOWNS; i++)
+        for (product[i] = size[i] = 0, j = 0; j < GT_UNKNOWNS; j++) {
+            product[i] += it->impulses[i + j * GT_UNKNOWNS] * jump[j];
+            size[i] += fabs(it->impulses[i + j * GT_UNKNOWNS] * jump[j]);
+        }
+}
+
 /* Refuses what would be more than an impulse, and impulses in laws that are not linear in them. */
 static gt_status gt_check_jump(gt_instance *it, int k, const double *b, const double *jump) {
-    double one[GT_UNKNOWNS], part[GT_UNKNOWNS], terms[GT_UNKNOWNS], before[GT_UNKNOWNS * GT_UNKNOWNS], from[GT_SYMBOLS];
-    int acting[GT_UNKNOWNS], i, j;
+    double one[GT_UNKNOWNS], part[GT_UNKNOWNS], terms[GT_UNKNOWNS], product[GT_UNKNOWNS], size[GT_UNKNOWNS], from[GT_SYMBOLS];
+    int i, j;
     memset(terms, 0, sizeof terms);
     for (i = 0; i < GT_UNKNOWNS; i++) {
         if (b[i] == 0) continue;
@@ -99,27 +110,21 @@ static gt_status gt_check_jump(gt_instance *it, int k, const double *b, const do
         if (!gt_jump_of(it, one, part)) return GT_ERROR;
         for (j = 0; j < GT_UNKNOWNS; j++) terms[j] += fabs(part[j]);
     }
+    gt_times(it, jump, product, size);
     memcpy(from, it->symbols, sizeof from);
-    gt_impulses(it->a, before, it->w);
     for (j = 0; j < GT_UNKNOWNS; j++) {
-        acting[j] = fabs(jump[j]) > GT_NO_IMPULSE * terms[j];
-        if (acting[j] && k >= gt_unknown_orders[j] + 2)
+        if (fabs(jump[j]) <= GT_NO_IMPULSE * terms[j]) continue;
+        if (k >= gt_unknown_orders[j] + 2)
             return gt_refuse_jump(it, gt_unknown_names[j], "would be infinite, more than an impulse: a position jumps on a mass, or the "
                                   "like; let it rise within a time, or put a spring or damper between");
-        if (acting[j]) it->symbols[gt_unknown_ends[j]] += jump[j];
+        it->symbols[gt_unknown_ends[j]] += jump[j];
     }
-    gt_impulses(it->a, it->impulses, it->w);
+    gt_times(it, jump, one, part);
     memcpy(it->symbols, from, sizeof from);
-    for (i = 0; i < GT_UNKNOWNS; i++) {
-        double bent = 0, size = 0;
-        for (j = 0; j < GT_UNKNOWNS; j++) {
-            bent += (it->impulses[i + j * GT_UNKNOWNS] - before[i + j * GT_UNKNOWNS]) * jump[j];
-            size += fabs(before[i + j * GT_UNKNOWNS] * jump[j]);
-        }
-        if (gt_equation_counts[i] == 0 && fabs(bent) > GT_NO_IMPULSE * size)
-            return gt_refuse_jump(it, "the jump", "takes impulses that stand in a law that is not linear in them: smooth "
-                                  "what turns, or make the law linear");
-    }
+    for (i = 0; i < GT_UNKNOWNS; i++)
+        if (gt_equation_counts[i] == 0 && fabs(one[i] - product[i]) > GT_NO_IMPULSE * size[i])
+            return gt_refuse_jump(it, "the jump", "takes impulses that stand in a law that is not linear in them: smooth what turns, or "
+                                  "make the law linear");
     return GT_OK;
 }
 

@@ -9,7 +9,7 @@ from gantrytau import Fixed, Input, Model, Real, Samples, SolveError, der, if_el
 from gantrytau.blocks import Step
 from gantrytau_fmu import export_fmu, run_fmu
 from tests.families import first_of
-from tests.simulation.test_impulses import Cam, Divider, Held
+from tests.simulation.test_impulses import Cam, ChargedByVoltage, Divider, Drag, Held, Loose
 
 WAYS = [(version, exchange) for version in ("3.0", "2.0") for exchange in (False, True)]
 
@@ -70,9 +70,24 @@ def test_an_input_that_switches_a_constraint_throws_too(exchange, tmp_path):
     assert found.final("w") == pytest.approx((4.0 + 3 * 2 * 4.0) / (1 + 3 * 2**2), rel=1e-9)
 
 
-@pytest.mark.parametrize("exchange", [False, True])
-def test_a_position_that_jumps_on_a_mass_is_refused(exchange, tmp_path):
-    file = tmp_path / "jump.fmu"
-    export_fmu(Jumping(), file)
-    with pytest.raises(SolveError, match=r"the condition on time turns, and drive.f would be infinite"):
-        run_fmu(file, stop=2.0, step=0.3, model_exchange=exchange)
+REFUSED: list[tuple[type[Model], str]] = [
+    (Jumping, "the condition on time turns, and drive.f would be infinite"),
+    (Drag, "the jump takes impulses that stand in a law that is not linear in them"),
+    (Loose, "what jumps is not determined by the equations behind it"),
+]
+
+
+@pytest.mark.parametrize(("model", "words"), REFUSED)
+def test_what_no_impulse_does_is_refused(model, words, tmp_path):
+    file = tmp_path / "refused.fmu"
+    export_fmu(model(), file)
+    with pytest.raises(SolveError, match=words):
+        run_fmu(file, stop=2.0, step=0.3, model_exchange=model is Jumping)
+
+
+def test_charge_is_kept_where_the_capacity_changes_with_the_voltage(tmp_path):
+    file = tmp_path / "charged.fmu"
+    export_fmu(ChargedByVoltage(), file)
+    found = run_fmu(file, stop=2.0, step=0.3)
+    v, u = found.final("v"), found.final("u")
+    assert (v + v**3, v + u) == pytest.approx((2 * u, 3.0), rel=1e-8)  # 64 steps of fourth order
