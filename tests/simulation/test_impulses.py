@@ -276,6 +276,29 @@ def test_a_bead_thrown_back_into_a_sharp_corner_gains_nothing():
     assert np.all(np.diff(found["v"] ** 2 + found["w"] ** 2) < 1e-9)
 
 
+class Shuttle(Model):
+    """A belt at 1 m/s that turns round at 0 and 0.5 m, and what it drags: v' = 3 (w - v) + w' / 2."""
+
+    mode = Mode("on", "back")
+    y, w = Real(start=0.0, fixed=True), Real()
+    v = Real(start=0.0, fixed=True)
+
+    def equations(self) -> Any:
+        yield der(self.y) == self.w
+        yield self.w == self.mode.choose(on=1.0, back=-1.0)
+        yield der(self.v) == 3 * (self.w - self.v) + 0.5 * der(self.w)
+        yield transition(self.mode, "on", "back", self.y > 0.5)
+        yield transition(self.mode, "back", "on", self.y < 0)
+
+
+def test_modes_that_turn_to_and_fro_throw_once_each_time():
+    found, v, w = simulate(Shuttle(), stop=2.9), 0.0, 1.0
+    for length in (0.5, 0.5, 0.5, 0.5, 0.5, 0.4):
+        v = w + (v - w) * math.exp(-3 * length)
+        v, w = (v - w, -w) if length == 0.5 else (v, w)
+    assert found.final("v") == pytest.approx(v, rel=1e-6)
+
+
 class Rack(Model):
     """A wheel of 0.1 m that a rack turns, whose angle is prescribed, with a mass that a damper drags along."""
 

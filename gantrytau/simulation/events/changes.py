@@ -302,7 +302,8 @@ class Changes:
 
         errors: by which margins are known at least.
         """
-        before = self.point(k)
+        x, z, t, w = self.point(k)
+        before = x.copy(), z.copy(), t, w.copy()
         tried = [self.modes(k).copy()]
         while not any(np.array_equal(modes, old) for old in tried):
             tried.append(modes)
