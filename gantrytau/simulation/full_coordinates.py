@@ -70,6 +70,11 @@ class Coordinates:
     sizes: tuple[float, ...] = ()
 
     @property
+    def arguments(self) -> list[ca.SX]:
+        """Symbols of a point."""
+        return [self.x, self.z, time, self.t0, self.w]
+
+    @property
     def discretes(self) -> tuple[str, ...]:
         """Variables that whens set, which are held as well."""
         return self.dae.flat.discretes
@@ -99,7 +104,7 @@ class Coordinates:
     @cached_property
     def delayed(self) -> RatesAlong:
         """What is delayed, and its rates."""
-        return RatesAlong(self.rounds.past, [self.x, self.z, time, self.t0, self.w], self.ode, self.algebraic)
+        return RatesAlong(self.rounds.past, self.arguments, self.ode, self.algebraic)
 
     def integrator(
         self,
@@ -164,9 +169,8 @@ class Coordinates:
     @property
     def renewed(self) -> ca.Function:
         """The renewal as a function of x, z, t, t0, w."""
-        arguments = [self.x, self.z, time, self.t0, self.w]
         found = ca.densify(self.renewal)
-        return self.kept("renewed", lambda: ca.Function("renewed", arguments, [found], {"cse": True}))
+        return self.kept("renewed", lambda: ca.Function("renewed", self.arguments, [found], {"cse": True}))
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""
@@ -239,8 +243,7 @@ class Coordinates:
 
     def not_finite(self, point: Point, step: float) -> list[str]:
         """Names of what has no finite value at a point, or where its rates lead within a time, s."""
-        arguments = [self.x, self.z, time, self.t0, self.w]
-        function = ca.Function("rates", arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
+        function = ca.Function("rates", self.arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
         x, z, t, w = point
         rates = np.array(function(x, z, t, t, w)[0]).ravel()
         for share in (0.0, 1e-6, 1e-3, 1.0):
@@ -259,10 +262,8 @@ class Coordinates:
 
     def _made_slips(self) -> Slips:
         constraints = self.invariants[-1] if self.invariants else ca.SX(0, 1)
-        arguments = [self.x, self.z, time, self.t0, self.w]
-        return slips_of(
-            self.dae, self.inserted, arguments, constraints, 2 * len(self.sampled) + len(self.held)
-        )
+        first = 2 * len(self.sampled) + len(self.held)
+        return slips_of(self.dae, self.inserted, self.arguments, constraints, first)
 
     @property
     def _levels(self) -> list[tuple[list[int], AtPlaces, tuple[str, ...]]]:
@@ -369,9 +370,8 @@ class Coordinates:
 
     def _made_algebra(self) -> AtPlaces:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
-        arguments = [self.x, self.z, time, self.t0, self.w]
         return AtPlaces(
-            ca.Function("algebra", arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
+            ca.Function("algebra", self.arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
         )
 
     def weakest(self, point: Point, start: Point) -> list[str]:
@@ -386,7 +386,7 @@ class Coordinates:
                 return found
         if self.pivots.numel() == 0:
             return []
-        function = ca.Function("pivots", [self.x, self.z, time, self.t0, self.w], [ca.densify(self.pivots)])
+        function = ca.Function("pivots", self.arguments, [ca.densify(self.pivots)])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
         return depending(here, before, [e.name for e in self.dae.reduced.equations])
 

@@ -220,6 +220,7 @@ class Run:
         x, z = self.integrators.over(trail.x[here], trail.z[here], trail.t[ahead], courses)
         steps = self.integrators.steps - STARTING * (count if self.history else 1)
         least = self.integrators.shorter or 0.0  # steps kept short say nothing
+        steps -= (trail.t[here + count] - trail.t[here]) / least if least else 0.0
         if self.looks.by_steps(here, count, steps, least):
             return False
         reached = ahead[1:]

@@ -13,6 +13,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
+from gantrytau.simulation.events.impulses import turning
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.events.modes import in_modes, sorted_out
 from gantrytau.simulation.events.rounds import rounds_of
@@ -42,13 +43,13 @@ def all_coordinates(
     definitions += [(chains.named(n), e) for n, e in pieces.known.items()]
     substitution = solved.after([*definitions, *definitions_of(dae, given, pieces.residuals)])
     levels, rows = _invariants(dae, {i for i, _ in given}, pieces.residuals)
-    moving = [rates, column(solved.residuals), column(pieces.conditions), *levels]
+    moving = [rates, column(solved.residuals), column(pieces.conditions), *levels, *turning(dae, pieces)]
     slopes = ca.densify(ca.jacobian(column(list(last.values())), column(list(highest.values()))))
     renewal = dae.to_reduced(column([s.expression for s in dae.flat.sampled]))
     found = substitution.inserted([*moving, slopes, dae.openings, renewal, *_matrices(solved)])
     turns, outside = sorted_out(pieces.switched.switches, found[: len(moving)], substitution)
     ode, algebraic, conditions, *rest = outside.inserted(found)
-    invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(levels) :]
+    invariants, (pivots, dropped, renewed, *matrices) = rest[: len(levels)], rest[len(moving) - 3 :]
     w = ca.vertcat(w, *(turn.mode for turn in turns))
     arguments = [column([chains.named(n) for n in states]), column(solved.tears), time, t0, w]
     switches = Switches(turns, arguments, ode, algebraic)

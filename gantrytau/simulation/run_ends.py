@@ -6,6 +6,7 @@ from gantrytau.compiler.translated import Translated
 from gantrytau.errors import SolveError
 from gantrytau.flattening.flat_model import When
 from gantrytau.language.symbols import Range
+from gantrytau.simulation.events.impulses import Infinite
 
 REASONS = {
     "TOO_MUCH_WORK": "the steps became too small",
@@ -126,6 +127,35 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
         "equations have no solution there, or the motion would slide along the switch. Smooth it, as tanh(x / small) "
         "for sign(x), or change what jumps; friction that sticks is stick_slip; .result holds the motion up to "
         "there",
+        time=t,
+        equations=[],
+    )
+
+
+def infinite(dae: Translated, t: float, conditions: Sequence[str], error: Infinite) -> SolveError:
+    """What turns at time t takes more than an impulse."""
+    jumping, beyond = ", ".join(error.jumping[:4]), ", ".join(error.infinite[:4])
+    law = (
+        f"jump by impulses that stand in {beyond}, a law that is not linear in them. Make the law linear, or smooth what "
+        "turns, as tanh(x / small) for sign(x)"
+    )
+    place = (
+        f"jump at once, for which {beyond} would be infinite, more than an impulse. Expected positions that go on, whose "
+        "speeds may jump: let what is prescribed rise within a time, as by a ramp, or put a spring or damper between"
+    )
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and {jumping} would {law if error.law else place}; "
+        ".result holds the motion up to there",
+        time=t,
+        equations=error.infinite if error.law else [],
+    )
+
+
+def undetermined_jump(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
+    """The equations behind what turns at time t do not determine what jumps."""
+    return SolveError(
+        f"{dae.name}: at t = {t:.6g} s {' and '.join(conditions)} turns, and the equations behind it do not determine what "
+        "jumps, expected a mass or an inertia for every motion on both sides; .result holds the motion up to there",
         time=t,
         equations=[],
     )

@@ -203,7 +203,8 @@ def _check(start: float, stop: float, tolerance: float, points: int, max_step: f
 def _check_word(argument: str, found: object, words: Sequence[str | None]) -> None:
     if found not in words:
         raise ModelError(
-            f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}", argument=argument
+            f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",
+            argument=argument,
         )
 
 

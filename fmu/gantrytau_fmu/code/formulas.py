@@ -3,7 +3,8 @@
 t time, x states, u what is known from outside (inputs, then sampled variables, then Discretes, then
 what is delayed), z unknowns of the blocks
 that have no closed form, p parameters, e which conditions of whens have become true, m modes of frictions with exact
-stick-slip (1 forward, -1 backward, 0 locked), then of what switches. The force of such a friction is one of the z; its
+stick-slip (1 forward, -1 backward, 0 locked), then of what switches, y all variables with their derivatives, j their
+jumps. The force of such a friction is one of the z; its
 equation depends on the mode.
 """
 
@@ -20,6 +21,7 @@ from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
 from gantrytau_fmu.code.fmu_starts import Starts, starts_of
+from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas, impulses_of, turning_names
 from gantrytau_fmu.code.jumps import JumpFormulas, jump_of
 from gantrytau_fmu.code.switching import Switching, WithModes, switching, written
 
@@ -42,10 +44,10 @@ class Formulas:
     """Expressions in the symbols of `arrays`, by name of the array.
 
     careful: the same with other pivots, for where those of closed forms are small; margins: positive elsewhere. outputs:
-    expression by name; samples: new values of `held`, clocks: which period each follows; jump: what whens do; friction:
-    speed and breakaway force by turns; delays: what is known from the past, past: expressions of which it is that,
-    delay_times: in s; roots: name of an unknown -> what comes to zero where its closed form ends; switching: what turns
-    at events.
+    expression by name; samples: new values of `held`, clocks: which period each follows; jump: what whens do; impulses: what
+    jumps where a switch turns; friction: speed and breakaway force by turns; delays: what is known from the past, past:
+    expressions of which it is that, delay_times: in s; roots: name of an unknown -> what comes to zero where its closed form
+    ends; switching: what turns at events.
     """
 
     dae: Dae
@@ -59,6 +61,7 @@ class Formulas:
     periods: ca.SX
     discretes: tuple[str, ...]
     jump: JumpFormulas
+    impulses: ImpulseFormulas
     delays: tuple[str, ...]
     past: ca.SX
     delay_times: ca.SX
@@ -99,7 +102,8 @@ def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     # what is left implicit is solved with pivots chosen by value anyway
     quick = tuple(block if other.solution is not None else other for block, other in pairs)
     ways = [replace(found, dae=replace(dae, blocks=blocks)) for blocks in (quick, careful)]
-    kept = frozenset(t.mode.name() for way in ways for t in switching(way, way.dae.system()).turns)
+    thrown = turning_names(found)
+    kept = frozenset(t.mode.name() for way in ways for t in switching(way, way.dae.system(), thrown).turns)
     first = _formulas(ways[0], outputs, kept)
     if first.margins.is_constant():
         return first
@@ -123,13 +127,12 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
     initial = at_once([dae.to_reduced(e.residual) for e in flat.initial_equations])
     past = at_once(found.past)
     everything = [system.ode, system.residuals, *wanted, *updates, *rows, friction, *initial, *past]
-    jump = jump_of(found, at_once)
-    differentiated = _input_derivatives(dae, column([*everything, *jump.everything]))
+    jump, impulses = jump_of(found, at_once), impulses_of(found, turning.outside, at_once)
+    differentiated = _input_derivatives(dae, column([*everything, *jump.everything, *impulses.everything]))
     free = [s for n, s in zip(system.inputs, system.u.elements(), strict=True) if n in set(dae.inputs)]
-    forces = [_symbol(system, f.force) for f in frictions]
     instants = (*(s.name for s in sampled), *flat.discretes, *(d.name for d in flat.delays))
     held = [_symbol(system, n) for n in instants]
-    blocks = _blocks(system, frictions, forces, rows)
+    blocks = _blocks(system, frictions, [_symbol(system, f.force) for f in frictions], rows)
     arrays = {
         "t": system.time,
         "x": system.x,
@@ -138,9 +141,9 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         "p": system.p,
         "m": column([*slides, turning.modes]),
         "e": jump.rose,
+        **impulses.arrays,
     }
     periods, clocks = _clocks(system, sampled)
-    starts = starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays)
     return Formulas(
         dae=dae,
         arrays=arrays,
@@ -153,6 +156,7 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         periods=periods,
         discretes=flat.discretes,
         jump=jump,
+        impulses=impulses,
         delays=tuple(d.name for d in flat.delays),
         past=column([ca.densify(e) for e in past]),
         delay_times=column(at_once([dae.to_reduced(d.time) for d in flat.delays])),
@@ -161,7 +165,7 @@ def _formulas(found: WithModes, outputs: Sequence[str], kept: frozenset[str]) ->
         frictions=tuple(f.force for f in frictions),
         friction=friction,
         roots=_roots(system, turning),
-        starts=starts,
+        starts=starts_of(dae, at_once, column(initial), column([b.residual for b in blocks]), arrays),
         parameters=system.parameters,
         margins=column(at_once([m for b in dae.blocks if b.solution is not None for m in b.margins])),
         switching=turning,

@@ -10,6 +10,7 @@ from gantrytau_fmu.code.c_functions import CFunction, c_function
 from gantrytau_fmu.code.contents import Contents
 from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
+from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas
 from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph
 from gantrytau_fmu.code.operations import number_text
 
@@ -22,6 +23,8 @@ SELDOM = {
     "gt_initial_slopes",
     "gt_pivots",
     "gt_jump",
+    "gt_symbols",
+    "gt_impulses",
 }
 
 
@@ -70,7 +73,7 @@ def model_code(
 
 
 def _function(graph: ExpressionGraph, name: str, roots: Sequence[int]) -> CFunction:
-    return c_function(graph, name, roots, seldom=name in SELDOM)
+    return c_function(graph, name, roots, seldom=name in SELDOM or name.startswith("gt_level_"))
 
 
 def _by_value(model: ModelGraph, name: str, roots: Sequence[int]) -> list[CFunction]:
@@ -124,6 +127,9 @@ def _sizes(model: ModelGraph, variables: int, pieces: Sequence[CFunction]) -> di
         GT_MATRICES=sum(n * n for n in counts),
         GT_PARAMETERS=len(formulas.parameters),
         GT_OUTPUTS=len(model.outputs),
+        GT_LEVELS=len(formulas.impulses.by_level),
+        GT_UNKNOWNS=formulas.impulses.j.numel() // max(len(formulas.impulses.by_level), 1),
+        GT_SYMBOLS=formulas.impulses.y.numel(),
         GT_FRICTIONS=len(formulas.frictions),
         GT_TURNS=len(turns),
         GT_GAPS=len(turns) + sum(turn.counts for turn in turns),
@@ -177,6 +183,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _texts("gt_held_names", (*formulas.held, *formulas.discretes)),
         *([_texts("gt_delay_names", formulas.delays)] if formulas.delays else []),
         _texts("gt_clock_names", [formulas.held[k] for k in held]),
+        *(_of_impulses(formulas.impulses) if formulas.impulses.by_level else []),
         "typedef struct {",
         "  void (*residual)(const double *const *a, double *restrict r, double *restrict w);",
         "  void (*jacobian)(const double *const *a, double *restrict r, double *restrict w);",
@@ -192,6 +199,18 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         first, matrix = first + count, matrix + count * count
     rows = rows or ["{0, 0, 0, 0, 0, 0, 0}"]
     return [*lines, f"static const gt_block gt_blocks[] = {{{', '.join(rows)}}};"]
+
+
+def _of_impulses(impulses: ImpulseFormulas) -> list[str]:
+    levels = ", ".join(f"gt_level_{k}" for k in range(1, len(impulses.by_level) + 1))
+    return [
+        f"static void (*const gt_levels[])(const double *const *a, double *restrict r, double *restrict w) = {{{levels}}};",
+        _texts("gt_unknown_names", impulses.levels.dae.indexed.orders),
+        _integers("gt_unknown_orders", impulses.levels.orders),
+        _integers("gt_equation_counts", impulses.levels.counts),
+        _integers("gt_unknown_ends", impulses.levels.ends),
+        _integers("gt_state_symbols", impulses.states),
+    ]
 
 
 def _quoted(text: str) -> str:

@@ -12,7 +12,7 @@ from gantrytau_fmu.code.formulas import Formulas
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
 OF_DELAYS = ("gt_past", "gt_past_rates", "gt_delay_times")
-ARRAYS = ("t", "x", "u", "z", "p", "m", "e", *SEEDS)
+ARRAYS = ("t", "x", "u", "z", "p", "m", "e", *SEEDS, "y", "j")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +95,9 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
     }
     if not formulas.delays:
         named = {name: found for name, found in named.items() if name not in OF_DELAYS}
+    if formulas.impulses.by_level:
+        named |= {"gt_symbols": formulas.impulses.symbols, "gt_impulses": formulas.impulses.jacobian}
+        named |= {f"gt_level_{k}": e for k, e in enumerate(formulas.impulses.by_level, start=1)}
     for k, block in enumerate(formulas.blocks):
         named[f"gt_residual_{k}"] = block.residual
         named[f"gt_jacobian_{k}"] = ca.vec(ca.densify(ca.jacobian(block.residual, block.unknowns)))

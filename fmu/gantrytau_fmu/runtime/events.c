@@ -185,7 +185,9 @@ static gt_status gt_begin_whens(gt_instance *it) {
     it->now.ended = it->now.events = 0;
     it->now.events_since = it->now.time;
     if (!GT_WHENS) return GT_OK;
+    it->resting = 1;
     status = gt_agree(it, &changed);
+    it->resting = 0;
     for (i = 0; i < GT_WHENS; i++) it->now.holds[i] = !gt_when_initially[i];
     return status;
 }
@@ -253,7 +255,7 @@ static gt_status gt_count(gt_instance *it) {
 static gt_status gt_update(gt_instance *it, gt_event_info *info) {
     int sampled = 0, happened = 0, acted = 1, round;
     const char *actor = NULL;
-    double turn = INFINITY;
+    double turn = INFINITY, x[GT_ROOM(GT_STATES)];
     gt_status status = GT_OK;
 #if GT_DELAYS
     if (!it->cosimulation) status = gt_remember(it);
@@ -270,7 +272,9 @@ static gt_status gt_update(gt_instance *it, gt_event_info *info) {
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: after %d rounds at time = %.9g s %s still becomes true: what it does makes itself true "
                           "again; let it do so once, as by a Discrete that says so", GT_NAME, GT_MOST_ROUNDS, it->now.time, it->last_event);
         acted = 0;
+        memcpy(x, it->now.x, sizeof x);
         status = gt_agree(it, &turned);
+        info->states_changed |= memcmp(x, it->now.x, GT_STATES * sizeof(double)) != 0;
         if (status == GT_OK) status = gt_friction_events(it, &changed);
         if (GT_WHENS && status == GT_OK) status = gt_act(it, info, &acted);
         if (acted) actor = it->last_event;

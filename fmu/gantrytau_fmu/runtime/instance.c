@@ -97,6 +97,13 @@ struct gt_instance {
     double k[7][GT_ROOM(GT_STATES)], trial[GT_ROOM(GT_STATES)], next[GT_ROOM(GT_STATES)];
     double jacobian[GT_ROOM(GT_STATES * GT_STATES)], rate_of_time[GT_ROOM(GT_STATES)];
     int order[GT_ROOM(GT_STATES)];
+#if GT_LEVELS
+    /* all variables with their derivatives, and their jumps; before a turn: these, the states and the modes */
+    double symbols[GT_SYMBOLS], jumps[GT_LEVELS * GT_UNKNOWNS], impulses[GT_UNKNOWNS * GT_UNKNOWNS];
+    double symbols_before[GT_SYMBOLS], x_before[GT_ROOM(GT_STATES)], m_before[GT_ROOM(GT_MODES)], late;
+    int jumping;
+#endif
+    int resting; /* at the start: what is told of the states holds behind what turns there */
     const char *last_event; /* name of the variable */
     double rows[GT_ROOM(GT_STATES)];
 };
@@ -185,7 +192,11 @@ static void gt_reset(gt_instance *it) {
     it->a[9] = it->du;
     it->a[10] = it->dz;
     it->a[11] = it->dp;
-    it->a[12] = it->c;
+#if GT_LEVELS
+    it->a[12] = it->symbols;
+    it->a[13] = it->jumps;
+#endif
+    it->a[14] = it->c;
     gt_point_at(it, &it->now.time, it->now.x);
 }
 

@@ -1,7 +1,7 @@
 /* Small dense linear systems: LU factors with row pivoting of rows scaled by their largest element. */
 
 #define GT_LARGER(a, b) ((a) > (b) ? (a) : (b))
-#define GT_LARGEST_SYSTEM GT_ROOM(GT_LARGER(GT_LARGER(GT_LARGEST_BLOCK, GT_STATES), GT_INITIAL))
+#define GT_LARGEST_SYSTEM GT_ROOM(GT_LARGER(GT_LARGER(GT_LARGEST_BLOCK, GT_UNKNOWNS), GT_LARGER(GT_STATES, GT_INITIAL)))
 #define GT_SMALLEST_PIVOT 1e-13 /* of a scaled row: below, the rows depend on each other */
 
 /* Factor a (n, n), stored column after column, in place. Returns the sign of its determinant, 0 if it is

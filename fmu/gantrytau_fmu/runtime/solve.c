@@ -229,7 +229,9 @@ static gt_status gt_present(gt_instance *it) {
         const int stale = it->now.stale || it->now.starts_stale;
         changed = 0;
         if (starting) status = gt_initial_equations(it);
+        it->resting = starting;
         if (GT_TURNS && stale && status == GT_OK) status = gt_agree(it, &changed);
+        it->resting = 0;
         if (changed && starting) it->now.stale = it->outputs_stale = 1;
     }
     return status;

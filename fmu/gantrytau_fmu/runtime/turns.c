@@ -20,6 +20,11 @@
 /* Behind the rates of the margins stands that of the fastest angle in them, in rad/s. */
 typedef struct { double values[GT_ROOM(GT_TURNS)], rates[GT_TURNS + 1], noise[GT_ROOM(GT_TURNS)]; } gt_margins;
 
+/* impulses.c: what jumps with modes, from the point before they turn */
+static void gt_before(gt_instance *it, const gt_margins *margins);
+static gt_status gt_throw(gt_instance *it);
+static void gt_take_back(gt_instance *it);
+
 /* How far each switch is from its next turn: below zero its mode does not hold. Two of one that counts. pace: of the fastest
  * angle, rad/s. */
 typedef struct { double left[GT_ROOM(GT_GAPS)], rates[GT_ROOM(GT_GAPS)], noise[GT_ROOM(GT_GAPS)], pace; } gt_gaps;
@@ -113,8 +118,9 @@ static gt_status gt_led_to(gt_instance *it, const double *modes, double *found) 
     gt_margins margins;
     gt_status status;
     memcpy(it->now.m + GT_FRICTIONS, modes, GT_TURNS * sizeof(double));
+    status = gt_throw(it);
     it->now.stale = it->outputs_stale = 1;
-    status = gt_look(it, &margins);
+    if (status == GT_OK) status = gt_look(it, &margins);
     if (status == GT_OK) gt_following(it, &margins, found);
     return status;
 }
@@ -165,6 +171,7 @@ static gt_status gt_disagree(gt_instance *it, double (*tried)[GT_ROOM(GT_TURNS)]
     int i;
     if (status != GT_OK) status = gt_led_to(it, tried[count - 1], found);
     memcpy(it->now.m + GT_FRICTIONS, tried[0], GT_TURNS * sizeof(double));
+    gt_take_back(it);
     it->now.stale = 1;
     if (status != GT_OK) return status;
     for (i = 0; i < GT_TURNS - 1 && tried[0][i] == tried[count - 1][i]; i++) {}
@@ -182,6 +189,7 @@ static gt_status gt_agree(gt_instance *it, int *changed) {
     *changed = 0;
     if (!GT_TURNS) return GT_OK;
     memcpy(found, modes, GT_TURNS * sizeof(double));
+    gt_before(it, NULL);
     for (;;) {
         gt_status status;
         memcpy(tried[count], found, sizeof found);
@@ -190,6 +198,7 @@ static gt_status gt_agree(gt_instance *it, int *changed) {
         else {
             gt_margins margins;
             status = gt_look(it, &margins);
+            if (status == GT_OK) gt_before(it, &margins);
             if (status == GT_OK) gt_following(it, &margins, found);
         }
         it->sink = kept;

@@ -13,6 +13,7 @@ import numpy as np
 from gantrytau.errors import SolveError
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.events.crossings import JUST_BEHIND
+from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.rounds import MOST, Made
 from gantrytau.simulation.events.sticking import HOLDS, WHENS
@@ -45,6 +46,11 @@ class Changes:
         self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
         self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self.ended = ""  # what a when said that ended the run
+        dae, pieces = coordinates.dae, coordinates.pieces
+        arguments = tuple(coordinates.arguments)
+        own = Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
+        self._impulses = coordinates.kept("impulses", lambda: own if turning(dae, pieces) else None)
+        self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
         self._acted: dict[
@@ -151,7 +157,8 @@ class Changes:
                     k = k + 1
                 self._agree(k, modes)
                 sampled = trail.due[left].any()  # results have the side behind only
-                if k > left and not sampled and switches.jumped(self.point(left), self.point(k)):
+                jumped = self._thrown or switches.jumped(self.point(left), self.point(k))
+                if k > left and not sampled and jumped:
                     trail.show(left, k)
             if by_states:
                 self._watch_chatter(k, self.modes(k) != first, margins)
@@ -315,12 +322,14 @@ class Changes:
 
         errors: by which margins are known at least.
         """
+        x, z, t, w = self.point(k)
+        before = x.copy(), z.copy(), t, w.copy()
         tried = [self.modes(k).copy()]
         while not any(np.array_equal(modes, old) for old in tried):
             tried.append(modes)
-            modes = self._led_to(k, modes, errors)
+            modes = self._led_to(k, modes, errors, before)
             if np.array_equal(modes, tried[-1]):
-                return None
+                return
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
@@ -328,33 +337,67 @@ class Changes:
             for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
                 modes = tried[0].copy()
                 modes[changing] = choice
-                if np.array_equal(self._led_to(k, modes, errors), modes):
-                    return None
-        before, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried))
+                if np.array_equal(self._led_to(k, modes, errors, before), modes):
+                    return
+        known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
         if np.any(
-            self._rounded > before
+            self._rounded > known
         ):  # margins may follow from large numbers that cancel: then rates decide
-            return self._agree(k, tried[1], errors)
+            self.trail.x[k], self.trail.z[k] = before[:2]
+            self._agree(k, tried[1], errors)
+            return
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
-    def _rounding(self, k: int, tried: Sequence[np.ndarray]) -> np.ndarray:
+    def _rounding(self, k: int, tried: Sequence[np.ndarray], before: Point) -> np.ndarray:
         """What rounding makes of the margins of a place, (switches,), the most in some modes."""
         found = []
         for modes in tried:
-            self._led_to(k, modes, 0.0)
+            self._led_to(k, modes, 0.0, before)
             found.append(self.coordinates.switches.rounding(self.point(k)))
         self.modes(k)[:] = tried[0]
         return np.max(found, axis=0)
 
-    def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float) -> np.ndarray:
-        """The modes that belong to the margins of a place that has these modes."""
+    def _led_to(self, k: int, modes: np.ndarray, errors: np.ndarray | float, before: Point) -> np.ndarray:
+        """The modes that belong to the margins of a place that gets these modes; before: what it was before them."""
         trail, places = self.trail, slice(k, k + 1)
         self.modes(k)[:] = modes
-        if self.coordinates.dae.flat.slips:
+        coordinates = self.coordinates
+        if self._impulses:
+            self._throw(k, before, self._impulses)
+        if coordinates.dae.flat.slips:
             self._slide_on(k, trail.held[k, self._slip_modes(k)] == 0)
-        trail.x[k] = self.coordinates.project(trail.x[places], trail.t[places], trail.rows(np.array([k])))[0]
+        drifted, z, t, w = (a.copy() for a in self.columns(np.array([k])))
+        trail.x[k] = coordinates.project(drifted, t, w)[0]
+        if self._impulses:  # margins are known no better than constraints
+            looks = [
+                coordinates.switches.look(x, z, t, w, self.sizes).values for x in (drifted, trail.x[places])
+            ]
+            errors = np.maximum(errors, 1.1 * np.abs(looks[1] - looks[0])[0])
         trail.z[k] = self._settled(k)
-        return self.coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
+        return coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
+
+    def _throw(self, k: int, before: Point, impulses: Impulses) -> None:
+        """Let the states of a place jump with what its modes turn; at the start what is told of them holds behind it."""
+        coordinates, trail, (x, _, t, w) = self.coordinates, self.trail, before
+        self._thrown = False
+        if k == 0:
+            trail.x[k] = coordinates.followed(x, t, trail.inputs(k))
+            return
+        turned = np.flatnonzero(self.modes(k) != w[w.size - self.modes(k).size :])
+        behind = trail.inputs(k).copy()
+        slips = coordinates.dae.flat.slips
+        if slips:  # the impulse of a friction is finite as its force is
+            behind[coordinates.slips.modes] = 1.0
+        try:
+            found = impulses.behind(before, behind, self.span + abs(t))
+        except Infinite as error:
+            raise run_ends.infinite(coordinates.dae, t, self.conditions(turned), error) from None
+        except np.linalg.LinAlgError:
+            raise run_ends.undetermined_jump(coordinates.dae, t, self.conditions(turned)) from None
+        self._thrown = found is not None
+        trail.x[k] = x if found is None else found
+        if slips and found is not None:
+            self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
 
     def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
         """SolveError if what states made switch turns again and again, and does not leave zero in between or accumulates."""
