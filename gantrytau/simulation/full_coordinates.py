@@ -370,9 +370,8 @@ class Coordinates:
 
     def _made_algebra(self) -> AtPlaces:
         jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
-        return AtPlaces(
-            ca.Function("algebra", self.arguments, [ca.densify(self.algebraic), jacobian], {"cse": True})
-        )
+        parts = [ca.densify(self.algebraic), jacobian]
+        return AtPlaces(ca.Function("algebra", self.arguments, parts, {"cse": True}))
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -395,8 +394,7 @@ def _shortest(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """The shortest steps d with jacobian d = residual, (points, n)."""
     square = jacobian @ jacobian.transpose(0, 2, 1)
     try:
-        found = jacobian.transpose(0, 2, 1) @ np.linalg.solve(square, residual[:, :, None])
-        return found[:, :, 0]
+        return (jacobian.transpose(0, 2, 1) @ np.linalg.solve(square, residual[:, :, None]))[:, :, 0]
     except np.linalg.LinAlgError:
         pairs = zip(jacobian, residual, strict=True)
         return np.array([np.linalg.lstsq(j, r, rcond=1e-12)[0] for j, r in pairs])

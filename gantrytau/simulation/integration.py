@@ -10,11 +10,11 @@ from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.between.across import across, lay, left_at
 from gantrytau.simulation.between.narrow_forces import NarrowForces
+from gantrytau.simulation.between.pulses import pulses
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
 from gantrytau.simulation.events.margins import ROUNDING, Margins
-from gantrytau.simulation.events.pulses import pulses
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import MOST_STEPS, WALKED_STEPS, Integrators
 from gantrytau.simulation.memory.past_values import PastValues

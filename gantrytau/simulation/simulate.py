@@ -20,7 +20,7 @@ from gantrytau.errors import DoubtfulResult, ModelError, SolveError
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
-from gantrytau.simulation.events.passed_limits import passed, stopping
+from gantrytau.simulation.between.passed_limits import passed, stopping
 from gantrytau.simulation.events.sticking import with_sticking
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integration import Run
@@ -52,9 +52,8 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: s; inputs: name -> number, function of time, `Samples` ((times, values) for short), or a signal as
-    `white_noise`; an input that is not named keeps its start value. Where up to `points` (or 500) samples jump, the result
-    has both sides, at a time that repeats.
+    start, stop: s; inputs: name -> number, function of time, `Samples` ((times, values) for short), or a signal, `white_noise`;
+    others keep their start values. Where up to `points` (or 500) samples jump, the result has both sides, at a repeated time.
     parameters: name -> value; outputs: names to keep (all); tolerance: relative, and absolute in units of a state's
     `nominal`, of the result (a step of the integrator gets a tenth, and errors of long motions add up). A state without
     nominal counts as of size 1, or of that of a start below 1e-3; where all states that hang together stay below a
@@ -65,8 +64,7 @@ def simulate(
     an FMU keeps the states of its export.
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
-    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however often
-    it turns: places are laid by the rates of what it depends on.
+    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however often it turns.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
     singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
@@ -77,8 +75,7 @@ def simulate(
     that are not finite although the states are, and of limits that are passed.
     """
     _check(start, stop, tolerance, points, max_step)
-    _check_word("limits", limits, ("warn", "stop", None))
-    _check_word("singular", singular, ("stop", "cross"))
+    _check_words(limits, singular)
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -200,12 +197,16 @@ def _check(start: float, stop: float, tolerance: float, points: int, max_step: f
         )
 
 
-def _check_word(argument: str, found: object, words: Sequence[str | None]) -> None:
-    if found not in words:
-        raise ModelError(
-            f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",
-            argument=argument,
-        )
+def _check_words(limits: object, singular: object) -> None:
+    for argument, found, words in (
+        ("limits", limits, ("warn", "stop", None)),
+        ("singular", singular, ("stop", "cross")),
+    ):
+        if found not in words:
+            raise ModelError(
+                f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",
+                argument=argument,
+            )
 
 
 def _check_inputs(dae: Translated, signals: Mapping[str, Signal]) -> None:

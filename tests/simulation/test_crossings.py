@@ -27,7 +27,7 @@ from gantrytau import (
     time,
     when,
 )
-from gantrytau.simulation.events.changes import accumulate
+from gantrytau.simulation.between.chatter import accumulate
 from gantrytau.simulation.events.crossings import located
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.poles import without_poles
@@ -146,7 +146,7 @@ def test_what_turns_without_leaving_its_switch_is_told(model, stop):
 
 
 def test_turns_that_accumulate_at_a_pole_are_told(monkeypatch):
-    monkeypatch.setattr("gantrytau.simulation.events.changes.MANY", (256,))
+    monkeypatch.setattr("gantrytau.simulation.between.chatter.MANY", (256,))
 
     class Counting(Model):
         x = Real(start=-1.0, fixed=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp, if_else, simulate, tanh, time
-from gantrytau.simulation.events.pulses import pulses
+from gantrytau.simulation.between.pulses import pulses
 
 
 class Pushed(Model):

@@ -6,13 +6,14 @@ consistent, the switches get their sides anew, until no condition becomes true a
 """
 
 from collections.abc import Sequence
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
 
 from gantrytau.errors import SolveError
 from gantrytau.simulation import run_ends
-from gantrytau.simulation.events.crossings import JUST_BEHIND
+from gantrytau.simulation.between.chatter import HOP, Chatter
+from gantrytau.simulation.events.crossings import at_zero, location_errors
 from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.rounds import MOST, Made
@@ -23,15 +24,6 @@ from gantrytau.simulation.singular_poses import Point
 from gantrytau.simulation.trail import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
-CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
-MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
-HALVES = 5
-SHRINKING = (
-    0.42  # of an interval between two turns to that after half as many: less than 1 / 2, which is 1 / k
-)
-HOP = (
-    1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
-)
 HOPS = 3  # of them, one after another
 
 
@@ -43,7 +35,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
+        self._chatter = Chatter()
         self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
@@ -234,7 +226,7 @@ class Changes:
             after = self.margins(np.array([k]))
             own = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
             self._watch_hops((made.acts != 0) & own, t, before, after)
-            errors = _location_errors(before, after, t, coordinates.switches.whole(before.values))
+            errors = location_errors(before, after, t, coordinates.switches.whole(before.values))
             modes = coordinates.switches.following(after.blurred(errors))
             if not np.array_equal(modes, self.modes(k)):
                 self._agree(k, modes, errors)
@@ -295,7 +287,7 @@ class Changes:
     def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
         rates, noise = before.rates[0], before.noise[0]
-        passed = _at_zero(before, t, self.coordinates.switches.whole(before.values)) & (rates != 0)
+        passed = at_zero(before, t, self.coordinates.switches.whole(before.values)) & (rates != 0)
         for i in np.flatnonzero(acts).tolist():
             own = [k for k in self.coordinates.rounds.of[i] if passed[k]]
             last, began = self._acted.get(i, (-np.inf, rates))
@@ -401,37 +393,8 @@ class Changes:
 
     def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
         """SolveError if what states made switch turns again and again, and does not leave zero in between or accumulates."""
-        t = float(self.trail.t[k])
-        whole = self.coordinates.switches.whole(before.values)
-        turned = np.flatnonzero(changed if changed.any() else _at_zero(before, t, whole))
-        for i in turned.tolist():
-            hops, times = self._turned.setdefault(i, (0, []))
-            last = times[-1] if times else -np.inf
-            # of a parabola: the farthest
-            near = abs(before.rates[0, i]) / 4 < HOP * before.noise[0, i] / (t - last) if t > last else True
-            hops = hops + 1 if near else 0
-            times.append(t)
-            self._turned[i] = hops, times
-            if hops >= CHATTERS:
-                raise run_ends.chattering(self.coordinates.dae, t, self.conditions(turned))
-            if len(times) in MANY and accumulate(times):
-                raise run_ends.never_past(self.coordinates.dae, t, self.conditions(turned))
-
-
-def accumulate(times: Sequence[float]) -> bool:
-    """Whether intervals shrink faster than 1 / k, at k and at each half of it, so that their sum has a limit."""
-    last = [times[(len(times) >> n) - 1] - times[(len(times) >> n) - 2] for n in range(HALVES + 1)]
-    return all(later < SHRINKING * earlier for later, earlier in pairwise(last))
-
-
-def _at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:
-    """Which margins of a place are where they turn, as well as that is located, (switches,)."""
-    rest = np.abs(margins.values - whole)[0]
-    return rest <= 2 * JUST_BEHIND * margins.noise[0] + 8 * np.spacing(abs(t)) * np.abs(margins.rates[0])
-
-
-def _location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
-    """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
-    same = np.abs(after.values - before.values)[0] <= after.noise[0]
-    rest = np.abs(before.values - whole)[0]
-    return np.where(_at_zero(before, t, whole) & same, 1.1 * rest, 0.0)
+        dae, t = self.coordinates.dae, float(self.trail.t[k])
+        turned, what = self._chatter.found(t, changed, before, self.coordinates.switches.whole(before.values))
+        if what:
+            told = run_ends.chattering if what == "chattering" else run_ends.never_past
+            raise told(dae, t, self.conditions(turned))

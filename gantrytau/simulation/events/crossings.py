@@ -103,3 +103,16 @@ def located(
             waits = np.where(falling, (left + gaps.noise[0]) / -gaps.rates[0], np.inf)
         guess = there[2] + float(np.min(waits, initial=np.inf))
     return high if end == high[2] else None
+
+
+def at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+    """Which margins of a place are where they turn, as well as that is located, (switches,)."""
+    rest = np.abs(margins.values - whole)[0]
+    return rest <= 2 * JUST_BEHIND * margins.noise[0] + 8 * np.spacing(abs(t)) * np.abs(margins.rates[0])
+
+
+def location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+    """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
+    same = np.abs(after.values - before.values)[0] <= after.noise[0]
+    rest = np.abs(before.values - whole)[0]
+    return np.where(at_zero(before, t, whole) & same, 1.1 * rest, 0.0)

@@ -1,0 +1,52 @@
+"""Switches that turn again and again and do not leave zero in between, or ever faster: no integrator gets past them."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from gantrytau.simulation.events.crossings import at_zero
+from gantrytau.simulation.events.margins import Margins
+
+CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
+MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
+HALVES = 5
+SHRINKING = (
+    0.42  # of an interval between two turns to that after half as many: less than 1 / 2, which is 1 / k
+)
+HOP = (
+    1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
+)
+
+
+class Chatter:
+    """How often each switch has turned, and when."""
+
+    def __init__(self):
+        self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
+
+    def found(
+        self, t: float, changed: np.ndarray, before: Margins, whole: np.ndarray
+    ) -> tuple[np.ndarray, Literal["", "chattering", "accumulating"]]:
+        """The switches that turn at an instant, and what becomes of them; before: margins at it, whole: where they turn."""
+        turned = np.flatnonzero(changed if changed.any() else at_zero(before, t, whole))
+        for i in turned.tolist():
+            hops, times = self._turned.setdefault(i, (0, []))
+            last = times[-1] if times else -np.inf
+            # of a parabola: the farthest
+            near = abs(before.rates[0, i]) / 4 < HOP * before.noise[0, i] / (t - last) if t > last else True
+            hops = hops + 1 if near else 0
+            times.append(t)
+            self._turned[i] = hops, times
+            if hops >= CHATTERS:
+                return turned, "chattering"
+            if len(times) in MANY and accumulate(times):
+                return turned, "accumulating"
+        return turned, ""
+
+
+def accumulate(times: Sequence[float]) -> bool:
+    """Whether intervals shrink faster than 1 / k, at k and at each half of it, so that their sum has a limit."""
+    last = [times[(len(times) >> n) - 1] - times[(len(times) >> n) - 2] for n in range(HALVES + 1)]
+    return all(later < SHRINKING * earlier for later, earlier in pairwise(last))
