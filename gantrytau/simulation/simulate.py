@@ -52,8 +52,8 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: s; inputs: name -> number, function of time, `Samples` ((times, values) for short), or a signal, `white_noise`;
-    others keep their start values. Where up to `points` (or 500) samples jump, the result has both sides, at a repeated time.
+    start, stop: s; inputs: name -> number, function of time, `Samples` ((times, values) for short), or a `white_noise`;
+    others keep their start values. Where up to `points` (or 500) samples jump, the result has both sides of the jump.
     parameters: name -> value; outputs: names to keep (all); tolerance: relative, and absolute in units of a state's
     `nominal`, of the result (a step of the integrator gets a tenth, and errors of long motions add up). A state without
     nominal counts as of size 1, or of that of a start below 1e-3; where all states that hang together stay below a

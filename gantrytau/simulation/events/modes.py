@@ -66,8 +66,9 @@ def sorted_out(
 
     moving: expressions of the motions; margins come out in their symbols, as those of `substitution` lead to them.
     """
-    margins = substitution.inserted([turn.margin for turn in turns])
-    margins = [m if turn.counts else without_poles(m) for turn, m in zip(turns, margins, strict=True)]
+    # poles as they are written: solutions of equations that divide are exact as they are, and would not be without
+    margins = [turn.margin if turn.counts else without_poles(turn.margin) for turn in turns]
+    margins = substitution.inserted(margins)
     turns = [Turn(turn.mode, m, turn.closed, turn.counts) for turn, m in zip(turns, margins, strict=True)]
     own = {turn.mode.name() for turn in turns}
     turns = _in_order(turns, own)
