@@ -264,6 +264,18 @@ def test_an_unstable_plant_runs_away_without_feedback():
     assert optimum["plant.x"][-1] == pytest.approx(0.0, abs=1e-8)
 
 
+def test_a_playback_errs_no_more_on_many_elements():
+    optimum = optimize(Caught, elements=200)
+    borders = np.linspace(0.0, 2.0, 201)[:, None]
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    spans = np.diff(borders, axis=0) / 2
+    t = borders[:-1] + spans * (1 + nodes)
+    pushes = np.exp(8 * (2 - t)) * optimum.signal("plant.u")(t.ravel()).reshape(t.shape)
+    # x(T) = exp(a T) x(0) + int exp(a (T - t)) u dt: terms of exp(16), which is 9e6, to rounding
+    exact = np.exp(16.0) + np.sum(pushes * weights * spans)
+    assert optimum.playback["plant.x"][-1] == pytest.approx(exact, abs=1e-8)
+
+
 class Explosive(Model):
     """x' = 10 x^2 + u has a pole where u fails to hold it."""
 

@@ -2,8 +2,11 @@
 
     dx/ds = h f(t0 + h s, x, z, u(s)),  0 = g(...),  0 <= s <= 1        on every piece between two borders
 
-Inputs are the polynomials of the solution, so a piece is smooth; CVODES or IDAS integrates it to a tolerance far
-below that of the transcription.
+Inputs are the polynomials of the solution, so a piece is smooth. CVODES or IDAS begins anew on each, so that their errors
+add up over pieces, and an unstable plant makes them grow: tolerances are as tight as rounding permits, and what is smooth
+between 17 places is polished there by sweeps of Picard,
+
+    x(s) <- x(0) + h int_0^s f(x) ds        whose errors fall by a factor of h |df/dx|, to rounding
 """
 
 from dataclasses import dataclass
@@ -18,7 +21,8 @@ from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
-TOLERANCE = 1e-10
+AGREED = 2e-9  # of its size: by how much a first sweep may change a state
+TOLERANCES = (3e-14, 1e-10)  # the second where rounding in the equations does not let the first be reached
 PLACES = 0.5 - 0.5 * np.cos(
     np.pi * np.arange(17) / 16
 )  # Chebyshev's extremes: interpolation between them converges
@@ -88,7 +92,18 @@ def _weights(places: np.ndarray) -> np.ndarray:
     return np.linalg.solve(shifted.T, exact)
 
 
-def replay(built: Built, trajectory: Trajectory, tolerance: float = TOLERANCE) -> Replayed:
+def _partial_weights(places: np.ndarray) -> np.ndarray:
+    """Weights (n, n) of the integrals from 0 to each place, exact for polynomials through the places."""
+    degrees = np.eye(places.size)
+    primitives = np.polynomial.legendre.legint(degrees, lbnd=-1, axis=0)  # of each polynomial of Legendre
+    integrals = np.polynomial.legendre.legval(2 * places - 1, primitives).T / 2
+    return np.linalg.solve(np.polynomial.legendre.legvander(2 * places - 1, places.size - 1).T, integrals.T).T
+
+
+INTEGRALS = _partial_weights(PLACES)
+
+
+def replay(built: Built, trajectory: Trajectory) -> Replayed:
     """Integrate a phase with the inputs of the solution, from the solution's start."""
     phase = trajectory.phase
     pieces, owner = _pieces(trajectory)
@@ -179,21 +194,45 @@ def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """An integrator over a piece, and the algebraics it leaves out."""
+    """Integrators over a piece, the tightest first, and the algebraics they leave out."""
 
-    integrator: ca.Function
+    integrators: tuple[ca.Function, ...]
     kept: np.ndarray  # numbers of the algebraics that the integrator solves for
-    others: ca.Function  # (place, x, kept z, p) -> all algebraics
+    others: ca.Function  # (place, x, kept z, p) -> all algebraics, rates of x by the place
 
     def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
         """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
-        found = self.integrator(x0=state / sizes, z0=guess[self.kept], p=p)
+        found = self._integrated(x0=state / sizes, z0=guess[self.kept], p=p)
         x = np.array(found["xf"]).reshape(state.size, PLACES.size) * sizes[:, None]
-        if not np.all(np.isfinite(x)):
-            raise RuntimeError("not finite")
         kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size)
-        z = np.array(self.others(PLACES[None, :], x, kept, p))
-        return x.T, z.T
+        if not self.kept.size:
+            x = self._polished(x, kept, p, sizes[:, None])
+        return x.T, np.array(self.others(PLACES[None, :], x, kept, p)[0]).T
+
+    def _polished(self, x: np.ndarray, kept: np.ndarray, p: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """States (nx, 17) after sweeps, as long as these change them by less than the integrator may err, and ever less."""
+        last = AGREED
+        while True:
+            swept = x[:, :1] + np.array(self.others(PLACES[None, :], x, kept, p)[1]) @ INTEGRALS.T
+            change = float(np.max(np.abs(swept - x) / sizes))
+            if not change < last / 2:
+                return x
+            x, last = swept, change
+
+    def _integrated(self, **start: np.ndarray) -> dict[str, ca.DM]:
+        *tighter, last = self.integrators
+        for integrator in tighter:
+            try:
+                return _finite(integrator(**start))
+            except RuntimeError:
+                continue
+        return _finite(last(**start))
+
+
+def _finite(found: dict[str, ca.DM]) -> dict[str, ca.DM]:
+    if not found["xf"].is_regular():
+        raise RuntimeError("not finite")
+    return found
 
 
 def _system(built: Built, trajectory: Trajectory) -> _System:
@@ -229,13 +268,18 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     z = ca.vertcat(ca.SX(0, 1), *(symbols[i] for i in kept))
     p = ca.vertcat(values, begin, span, problem.numbers)
     scaled = ca.SX.sym("scaled", x.numel())
-    ode, residuals = ca.substitute([ode * span / nominal, residuals], [x], [scaled * nominal])
+    rates = ode * span
+    ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000, "show_eval_warnings": False}
+    options = {"max_num_steps": 20000, "show_eval_warnings": False}
     if not kept:
         del dae["z"], dae["alg"]
     method = "idas" if kept else "cvodes"
-    integrator = ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options)
-    return _System(
-        integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
+    integrators = tuple(
+        ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options | {"reltol": one, "abstol": one})
+        for one in TOLERANCES
     )
+    return _System(
+        integrators, np.array(kept, int),
+        ca.Function("others", [place, x, z, p], [ca.densify(algebraics), ca.densify(rates)]),
+    )  # fmt: skip
