@@ -243,7 +243,7 @@ class Unstable(Model):
 class Caught(Optimization):
     """To zero with the least effort: 2 a / (1 - exp(-2 a T)), which is 16."""
 
-    plant = Unstable()
+    plant: Any = Unstable()
     final_time = 2.0
 
     def integrand(self):
@@ -264,8 +264,20 @@ def test_an_unstable_plant_runs_away_without_feedback():
     assert optimum["plant.x"][-1] == pytest.approx(0.0, abs=1e-8)
 
 
-def test_a_playback_errs_no_more_on_many_elements():
-    optimum = optimize(Caught, elements=200)
+class Looped(Unstable):
+    """The same with an algebraic unknown that has no closed form."""
+
+    e = Real(start=8.0, description="a x, but for sin(e) / 10")
+    b = Parameter(1.0, unit="1/s")
+
+    def equations(self):
+        yield (self.e + 0.1 * sin(self.e)) * self.b == self.a * self.x
+        yield der(self.x) == (self.e + 0.1 * sin(self.e)) * self.b + self.u
+
+
+@pytest.mark.parametrize("plant", [Unstable, Looped])
+def test_a_playback_errs_no_more_on_many_elements(plant):
+    optimum = optimize(Caught(plant=plant()), elements=200)
     borders = np.linspace(0.0, 2.0, 201)[:, None]
     nodes, weights = np.polynomial.legendre.leggauss(8)
     spans = np.diff(borders, axis=0) / 2
