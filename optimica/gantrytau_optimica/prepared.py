@@ -23,6 +23,7 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
+from gantrytau_optimica.refinement.motions import as_motion
 from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
@@ -155,7 +156,8 @@ class Prepared(Record):
     def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
         if self.starts == 1:
-            return solved_or_raise(self._off_margins(self._alone(built, program, first, near), first))
+            found = self._off_margins(self._alone(built, program, first, near), first)
+            return solved_or_raise(self._as_motion(found))
         reached, settings = self._reached, self.solver.settings
         most = min(settings.max_iterations, MOST_FROM_COARSE)
         few = replace(settings, max_iterations=most)
@@ -170,7 +172,15 @@ class Prepared(Record):
         best = replace(best, search=search) if search is None else best.with_notes(search=search)
         if not best.success and search is not None and not reached.clock.left:
             raise reached.stopped(LATE)
-        return solved_or_raise(best)
+        return solved_or_raise(self._as_motion(best))
+
+    def _as_motion(self, found: Optimum) -> Optimum:
+        """An answer that is a motion when played back, on twice the elements where it is none on these."""
+
+        def solve(program: Program, first: np.ndarray) -> Optimum:
+            return self._in_turn(replace(found.built, problem=program.problem), program, first)
+
+        return as_motion(found, solve, lambda: self._reached.clock.left)
 
     def _alone(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """From one first guess, on its branch if it is a solution; with ramps, over the answer without if need be."""
@@ -186,18 +196,18 @@ class Prepared(Record):
 
     def _over_free(self, built: Built, program: Program) -> Optimum | None:
         """With inputs as ramps, from the answer with inputs that are free at every point: by its arcs if they tell all,
-        else on its mesh; None where either is not found.
+        else on its mesh; that answer itself where ramps have none, None where it is not found.
         """
         settings, layouts = self.solver.settings, program.places.layouts
-        settings = replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        free = self.solved(
-            replace(built, problem=plain.problem), plain, self._solver(plain, settings), first_guess(plain)
+        free = replace(self, refine=None)._in_turn(
+            replace(built, problem=plain.problem), plain, first_guess(plain)
         )
         if not free.success:
             return None
+        settings = replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
 
         def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
             few = replace(
@@ -212,10 +222,11 @@ class Prepared(Record):
             return by_arcs
         first = warm_start(list(free.phases.values()), program)
         for way in (replace(settings, barrier="near"), settings):
-            again = self.solved(built, program, self._solver(program, way), first)
-            if again.success or not self._reached.clock.left:
-                return again if again.success else None
-        return None
+            if self._reached.clock.left:
+                again = self.solved(built, program, self._solver(program, way), first)
+                if again.success:
+                    return again
+        return free
 
     def _off_margins(self, found: Optimum, first: np.ndarray) -> Optimum:
         """An optimum that rests on no margins of square roots, if there is one nearby and time to look for it."""
@@ -231,11 +242,12 @@ class Prepared(Record):
     def _in_turn(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
         """From one first guess: with limits that count as much as the objective, then with a barrier that falls no faster
         than step by step, at last with the objective as it is; each one only where those before leave to be desired.
-        Inputs as ramps, where loops keep them from coming quickly, over the answer without.
+        Inputs as ramps, where loops keep them from coming quickly or the first of these ways fails, over the answer without.
         """
         settings = self.solver.settings
-        if settings.firm and self.refine is not None and built.system.loops:
-            over = self._over_free(built, program)
+        over_free = settings.firm and self.refine is not None
+        if over_free and built.system.loops:
+            over_free, over = False, self._over_free(built, program)
             if over is not None:
                 return over
         most = MOST_FIRM if self.refine is None else MOST_RAMPS
@@ -249,6 +261,10 @@ class Prepared(Record):
             free = best.success and not best.solution.held
             if free or best.solution.status == NOT_BEGUN or not self._reached.clock.left:
                 break
+            if over_free and not best.success:
+                over_free, over = False, self._over_free(built, program)
+                if over is not None:
+                    return over
         assert best is not None
         return best
 

@@ -79,7 +79,7 @@ def message(wrong, **policy) -> str:
             lambda p: [p.mass.x <= final(p.mass.x)],
             "mixes a signal over the whole path with its value at one time",
         ),
-        (lambda p: [p.mass.x == 1 - p.mass.x, p.mass.u**2 == 1], "conditions for"),
+        (lambda p: [p.mass.x == 1 - p.mass.x, p.mass.u**2 == 1], "lies outside of the limits of mass.x, 0.5"),
     ],
 )
 def test_a_constraint_that_cannot_be(body, words):
@@ -165,6 +165,17 @@ def test_a_time_outside_of_a_fixed_horizon():
                 yield at(late, self.mass.x) == 0
 
         assert f"at({late}, ...): lies outside of the horizon" in message(Late)
+
+
+def test_a_time_that_only_the_guess_leaves_outside_names_the_guess():
+    class Late(FastestMass):
+        final_time = Free(1.0, unit="s", min=0.1)
+
+        def constraints(self):
+            yield from super().constraints()
+            yield at(1.5, self.mass.x) >= 0.5
+
+    assert "at 1.5 of its length with the guess final_time = 1; guess it so" in message(Late)
 
 
 def test_nothing_to_choose():

@@ -269,7 +269,8 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     equations = [ca.densify(one) for one in (algebraics, rates, residuals, slopes)]
     ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000, "show_eval_warnings": False}
+    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000}
+    options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
     if not kept:
         del dae["z"], dae["alg"]
     method = "idas" if kept else "cvodes"
