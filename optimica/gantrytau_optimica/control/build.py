@@ -27,7 +27,7 @@ from gantrytau_optimica.control.control_problem import (
 from gantrytau_optimica.control.first_guesses.guesses import first_guesses, horizon, number_guess
 from gantrytau_optimica.control.first_guesses.pace import at_pace
 from gantrytau_optimica.control.input_rates import Rates, check_pieces, check_reached, input_rates, lifted
-from gantrytau_optimica.control.limits import check_ends, check_symbols, limit_rows, with_limits
+from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
 from gantrytau_optimica.control.root_margins import with_margins
 from gantrytau_optimica.control.sizes import with_sizes
 from gantrytau_optimica.problem.model_words import algebraic_words
@@ -89,7 +89,6 @@ def build(
     ]
     draft = with_limits(draft, [*sorted_rows, *_in_order(draft)])
     check_symbols(draft, read.name)
-    check_ends(draft)
     check_reached(draft, zip(limits, rows[::3], strict=True))
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))

@@ -44,6 +44,7 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
         f"{solution.objective:.8g}, {horizon}",
         *([built.causality_words] if built.causality_words else []),
     ]
+    lines += [f"`{name}` follows from the others at the end." for name in program.problem.following]
     meanings = Meanings(built, program, phases)
     lines += _numbers_lost(built, program, solution, phases)
     runaways = [] if solution.success else _runaways(program, solution, meanings)

@@ -203,4 +203,6 @@ def to_dm(matrix: Sparse) -> ca.DM:
 def scipy_matrix(matrix: ca.DM) -> Sparse:
     """A matrix of CasADi as one of SciPy; `DM.sparse` is None where Ctrl-C is pressed while it asks Python for SciPy."""
     pattern = matrix.sparsity()
-    return sparse.csc_matrix((np.array(matrix.nonzeros()), pattern.row(), pattern.colind()), shape=matrix.shape)
+    return sparse.csc_matrix(
+        (np.array(matrix.nonzeros()), pattern.row(), pattern.colind()), shape=matrix.shape
+    )

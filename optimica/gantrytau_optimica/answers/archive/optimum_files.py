@@ -241,7 +241,9 @@ def _affine(phase: Trajectory, expressions: ca.SX) -> tuple[np.ndarray, Any, np.
     rows = expressions[np.flatnonzero(~bent).tolist()] if not bent.all() else ca.SX(0, 1)
     evaluate = ca.Function("affine", [signals], [ca.jacobian(rows, signals), ca.densify(rows)])
     slopes, offsets = evaluate(ca.DM.zeros(signals.numel()))
-    matrix = scipy_matrix(slopes).tocoo() if slopes.numel() else sparse.coo_matrix((rows.numel(), signals.numel()))
+    matrix = (
+        scipy_matrix(slopes).tocoo() if slopes.numel() else sparse.coo_matrix((rows.numel(), signals.numel()))
+    )
     return ~bent, matrix, np.array(offsets).ravel()
 
 
