@@ -218,7 +218,7 @@ def check_ends(problem: ControlProblem) -> None:
 
 
 def check_symbols(draft: ControlProblem, name: str) -> None:
-    """ModelError for what the problem needs but neither the model nor the optimiser decides, and for ends outside of limits."""
+    """ModelError for what a problem needs but neither model nor optimiser decides, and for ends outside of limits."""
     check_ends(draft)
     known = [draft.time, *(s.symbol for s in draft.signals), *(f.symbol for f in draft.free)]
     known += [c.symbol for phase in draft.phases for c in phase.courses]
