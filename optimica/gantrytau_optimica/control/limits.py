@@ -210,7 +210,7 @@ def check_ends(problem: ControlProblem) -> None:
             name = names.get(value.element_hash(), "")
             low, high = limits.get(name, (-np.inf, np.inf))
             slack = BESIDE * max(abs(x) for x in (low, high, row.lower) if np.isfinite(x))
-            if not low - slack <= row.lower <= high + slack:
+            if low < high and not low - slack <= row.lower <= high + slack:
                 raise ModelError(
                     f"{problem.name}: `{row.name}` lies outside of the limits of {name}, {low:.6g} to {high:.6g}; correct "
                     "one of them"
