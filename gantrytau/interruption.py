@@ -46,6 +46,10 @@ def heeding_interrupts() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, _heed)
     try:
         yield
+    except SystemError as error:  # what Python makes of Ctrl-C in a function that CasADi has called
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from error
+        raise
     finally:
         signal.signal(signal.SIGINT, before or signal.SIG_DFL)
 

@@ -68,3 +68,21 @@ def test_errors_go_before_interruptions():
 
     with pytest.raises(ValueError, match="wrong"):
         fail()
+
+
+def pressed_in_compiled_code():
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as cause:
+        raise SystemError("returned a result with an exception set") from cause
+
+
+def broken():
+    raise SystemError("of its own")
+
+
+def test_what_python_makes_of_ctrl_c_inside_of_compiled_code_is_one():
+    with pytest.raises(KeyboardInterrupt), heeding_interrupts():
+        pressed_in_compiled_code()
+    with pytest.raises(SystemError, match="of its own"), heeding_interrupts():
+        broken()

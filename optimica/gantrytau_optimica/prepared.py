@@ -16,6 +16,7 @@ from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.first_guesses.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
+from gantrytau_optimica.failures.following_ends import following_ends, without_following
 from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.open_ends import open_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
@@ -23,12 +24,13 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
+from gantrytau_optimica.refinement.motions import as_motion
 from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, solved_by_arcs, without_ramps
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import NOT_BEGUN, Solver, SolverSettings, objective_size
+from gantrytau_optimica.solving.ipopt import NOT_BEGUN, WORDS, Solver, SolverSettings, objective_size
 from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.program import Program, first_guess
@@ -48,8 +50,16 @@ MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
 MOST_CLOSER = 100  # iterations closer to zeros of square roots, where many more lead nowhere
+MET = 1e-4  # of its size: by how much a mesh may miss a condition that follows from others
 MOST_LEFT = 3  # places that are no minimum, which a solve leaves
 
+STALLED = tuple(
+    WORDS[word]
+    for word in (
+        "Maximum_Iterations_Exceeded", "Search_Direction_Becomes_Too_Small", "Restoration_Failed",
+        "Error_In_Step_Computation", "Infeasible_Problem_Detected", "Solved_To_Acceptable_Level",
+    )
+)  # fmt: skip
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
@@ -155,7 +165,8 @@ class Prepared(Record):
     def _best(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """The optimum from the guess, or the best from several. Raises SolveError if none is found."""
         if self.starts == 1:
-            return solved_or_raise(self._off_margins(self._alone(built, program, first, near), first))
+            found = self._off_margins(self._alone(built, program, first, near), first)
+            return solved_or_raise(self._as_motion(found))
         reached, settings = self._reached, self.solver.settings
         most = min(settings.max_iterations, MOST_FROM_COARSE)
         few = replace(settings, max_iterations=most)
@@ -170,7 +181,15 @@ class Prepared(Record):
         best = replace(best, search=search) if search is None else best.with_notes(search=search)
         if not best.success and search is not None and not reached.clock.left:
             raise reached.stopped(LATE)
-        return solved_or_raise(best)
+        return solved_or_raise(self._as_motion(best))
+
+    def _as_motion(self, found: Optimum) -> Optimum:
+        """An answer that is a motion when played back, on twice the elements where it is none on these."""
+
+        def solve(program: Program, first: np.ndarray) -> Optimum:
+            return self._in_turn(replace(found.built, problem=program.problem), program, first)
+
+        return as_motion(found, solve, lambda: self._reached.clock.left)
 
     def _alone(self, built: Built, program: Program, first: np.ndarray, near: bool) -> Optimum:
         """From one first guess, on its branch if it is a solution; with ramps, over the answer without if need be."""
@@ -186,18 +205,18 @@ class Prepared(Record):
 
     def _over_free(self, built: Built, program: Program) -> Optimum | None:
         """With inputs as ramps, from the answer with inputs that are free at every point: by its arcs if they tell all,
-        else on its mesh; None where either is not found.
+        else on its mesh; that answer itself where ramps have none, None where it is not found.
         """
         settings, layouts = self.solver.settings, program.places.layouts
-        settings = replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
         plain = transcribe(
             without_ramps(built.problem), [layout.mesh for layout in layouts], layouts[0].scheme
         )
-        free = self.solved(
-            replace(built, problem=plain.problem), plain, self._solver(plain, settings), first_guess(plain)
+        free = replace(self, refine=None)._in_turn(
+            replace(built, problem=plain.problem), plain, first_guess(plain)
         )
         if not free.success:
             return None
+        settings = replace(settings, max_iterations=min(settings.max_iterations, MOST_FIRM))
 
         def solve(program: Program, first: np.ndarray, hot: bool) -> Optimum:
             few = replace(
@@ -212,10 +231,11 @@ class Prepared(Record):
             return by_arcs
         first = warm_start(list(free.phases.values()), program)
         for way in (replace(settings, barrier="near"), settings):
-            again = self.solved(built, program, self._solver(program, way), first)
-            if again.success or not self._reached.clock.left:
-                return again if again.success else None
-        return None
+            if self._reached.clock.left:
+                again = self.solved(built, program, self._solver(program, way), first)
+                if again.success:
+                    return again
+        return free
 
     def _off_margins(self, found: Optimum, first: np.ndarray) -> Optimum:
         """An optimum that rests on no margins of square roots, if there is one nearby and time to look for it."""
@@ -231,11 +251,12 @@ class Prepared(Record):
     def _in_turn(self, built: Built, program: Program, first: np.ndarray) -> Optimum:
         """From one first guess: with limits that count as much as the objective, then with a barrier that falls no faster
         than step by step, at last with the objective as it is; each one only where those before leave to be desired.
-        Inputs as ramps, where loops keep them from coming quickly, over the answer without.
+        Inputs as ramps, where loops keep them from coming quickly or the first of these ways fails, over the answer without.
         """
         settings = self.solver.settings
-        if settings.firm and self.refine is not None and built.system.loops:
-            over = self._over_free(built, program)
+        over_free = settings.firm and self.refine is not None
+        if over_free and built.system.loops:
+            over_free, over = False, self._over_free(built, program)
             if over is not None:
                 return over
         most = MOST_FIRM if self.refine is None else MOST_RAMPS
@@ -249,8 +270,33 @@ class Prepared(Record):
             free = best.success and not best.solution.held
             if free or best.solution.status == NOT_BEGUN or not self._reached.clock.left:
                 break
+            if over_free and not best.success:
+                over_free, over = False, self._over_free(built, program)
+                if over is not None:
+                    return over
         assert best is not None
+        if best.solution.status in STALLED:
+            lighter = self._without_following(built, program)
+            worse = lighter and best.success and not lighter.success
+            return best if lighter is None or worse else lighter
         return best
+
+    def _without_following(self, built: Built, program: Program) -> Optimum | None:
+        """Without conditions at the end that follow from others there, on which a solve gets stuck; None where none do."""
+        layouts, ends = program.places.layouts, following_ends(built)
+        if not ends or layouts[0].scheme.scheme == "shooting":
+            return None
+        problem = without_following(built, ends)
+        lighter = transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme)
+        found = self._in_turn(replace(built, problem=problem), lighter, first_guess(lighter))
+        for limit, state in ends if found.success else []:
+            phase = next(p for p in found.phases.values() if state.symbol.element_hash() in
+                         {s.symbol.element_hash() for s in p.phase.states})  # fmt: skip
+            value = float(phase.values(state.symbol, phase.time[-1:])[0, 0])
+            if abs(value - limit.lower) > MET * state.nominal:
+                status = f"no solution: `{limit.name}` follows from the others at the end, which make it {value:.6g}"
+                return replace(found, solution=replace(found.solution, success=False, status=status))
+        return found
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""

@@ -247,7 +247,7 @@ def _free_numbers(dae: Dae, guess: Mapping[str, Any], held: Sequence[str]) -> tu
 
 
 def _declared_limits(dae: Dae) -> list[ConstraintRow]:
-    """Min and max of every variable of the model, eliminated ones included."""
+    """Min and max of every variable of the model, eliminated ones included, and ends of tables with outside="error"."""
     found = []
     for variable in dae.flat.variables:
         if variable.min is None and variable.max is None:
@@ -256,6 +256,9 @@ def _declared_limits(dae: Dae) -> list[ConstraintRow]:
             low = variable.min[k] if variable.min is not None else ca.SX(-ca.inf)
             high = variable.max[k] if variable.max is not None else ca.SX(ca.inf)
             found.append(ConstraintRow(symbol, low, high, f"limits of {name}"))
+    for one in dae.flat.ranges:
+        words = f"{one.name} between the ends of its table, {one.low:g} and {one.high:g}"
+        found.append(ConstraintRow(one.expression, ca.SX(one.low), ca.SX(one.high), words))
     return found
 
 

@@ -7,6 +7,7 @@ import casadi as ca
 
 from gantrytau import ModelError
 from gantrytau.compiler.system import Causality, System
+from gantrytau.language.instructions import computed
 from gantrytau.language.symbols import split_derivative, time
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.problem.optimization import Point
@@ -63,7 +64,32 @@ def with_values(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mappin
     old = [read.dae.parameter_symbols[n] for n in numbers]
     new = [ca.SX(x) for x in numbers.values()]
     expressions = _with_courses(expressions, read)
+    if read.dae.flat.ranges:
+        expressions = _without_ends(expressions)
     return ca.substitute(expressions, [ca.vertcat(*old)], [ca.vertcat(*new)]) if old else expressions
+
+
+def _without_ends(expressions: list[ca.SX]) -> list[ca.SX]:
+    """Tables that are not defined beyond their ends, defined there as well: limits keep their arguments inside.
+
+    Such a table is a product with sqrt(1 - 2 beyond), the only roots of what is constant piece by piece.
+    """
+    column = ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.densify(e)) for e in expressions))
+    symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(column))
+
+    def apply(operator: int, operands: list[ca.SX]) -> ca.SX:
+        step = operator == ca.OP_SQRT and not operands[0].is_constant()
+        if step and ca.jacobian(operands[0], symbols).is_zero():
+            return ca.SX(1.0)
+        return (ca.SX.binary if len(operands) == 2 else ca.SX.unary)(operator, *operands)
+
+    function = ca.Function("tables", [symbols], [column])
+    (found,) = computed(function, lambda _, i: symbols[i], ca.SX, apply)
+    parts = iter(found)
+    return [
+        ca.reshape(ca.vertcat(ca.SX(0, 1), *(next(parts) for _ in range(e.numel()))), *e.shape)
+        for e in expressions
+    ]
 
 
 def _with_courses(expressions: list[ca.SX], read: SymbolicProblem) -> list[ca.SX]:

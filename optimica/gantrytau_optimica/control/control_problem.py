@@ -153,7 +153,9 @@ class Phase:
 
 @dataclass(frozen=True, eq=False)
 class ControlProblem:
-    """Phases, the numbers they share, the objective beside the integrals, and conditions on points."""
+    """Phases, the numbers they share, the objective beside the integrals, and conditions on points; following: names
+    of those that were left out, as others decide them.
+    """
 
     name: str
     time: ca.SX
@@ -161,6 +163,7 @@ class ControlProblem:
     free: tuple[FreeNumber, ...]
     objective: ca.SX
     boundary: tuple[Limit, ...]
+    following: tuple[str, ...] = ()
 
     @property
     def numbers(self) -> ca.SX:

@@ -11,6 +11,8 @@ from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow
 
+BESIDE = 1e-8  # of its size: by how much an end may lie outside of a limit, as the solver's tolerance lets it
+
 
 def limit_rows(
     constraint: ConstraintRow, expression: ca.SX, low: ca.SX, high: ca.SX, name: str
@@ -198,8 +200,26 @@ def known_states(problem: ControlProblem) -> dict[Moment, dict[int, Limit]]:
     return found
 
 
+def check_ends(problem: ControlProblem) -> None:
+    """ModelError for a condition that asks of a signal at an end what its limits exclude."""
+    for (number, _), demanded in values_demanded(problem).items():
+        phase = problem.phases[number]
+        names = {s.symbol.element_hash(): s.name for s in phase.signals}
+        limits = signal_limits(phase, problem.name)
+        for value, row in demanded:
+            name = names.get(value.element_hash(), "")
+            low, high = limits.get(name, (-np.inf, np.inf))
+            slack = BESIDE * max(abs(x) for x in (low, high, row.lower) if np.isfinite(x))
+            if low < high and not low - slack <= row.lower <= high + slack:
+                raise ModelError(
+                    f"{problem.name}: `{row.name}` lies outside of the limits of {name}, {low:.6g} to {high:.6g}; correct "
+                    "one of them"
+                )
+
+
 def check_symbols(draft: ControlProblem, name: str) -> None:
-    """ModelError for what the problem needs but neither the model nor the optimiser decides."""
+    """ModelError for what a problem needs but neither model nor optimiser decides, and for ends outside of limits."""
+    check_ends(draft)
     known = [draft.time, *(s.symbol for s in draft.signals), *(f.symbol for f in draft.free)]
     known += [c.symbol for phase in draft.phases for c in phase.courses]
     known += [e for p in (*draft.points, *draft.sums) for e in p.symbol.elements()]

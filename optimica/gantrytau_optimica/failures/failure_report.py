@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.failures.dependence import dependent_conditions
+from gantrytau_optimica.failures.kinks import WAY_OUT, kinks
 from gantrytau_optimica.failures.nonfinite import not_finite
 from gantrytau_optimica.failures.row_meanings import Meanings, intervals, row_sizes, signal_words
 from gantrytau_optimica.solving.ipopt import FAR, NOT_BEGUN, WORDS, Solution
@@ -43,6 +44,7 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
         f"{solution.objective:.8g}, {horizon}",
         *([built.causality_words] if built.causality_words else []),
     ]
+    lines += [f"`{name}` follows from the others at the end." for name in program.problem.following]
     meanings = Meanings(built, program, phases)
     lines += _numbers_lost(built, program, solution, phases)
     runaways = [] if solution.success else _runaways(program, solution, meanings)
@@ -57,6 +59,9 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
             lines += _accuracy(program, solution, meanings, met=not violations)
     elif solution.status in UNFINISHED:
         lines += _accuracy(program, solution, meanings, met=True)
+    if not solution.success and solution.status in (*STUCK, *UNFINISHED):
+        bent = _list("Not smooth, so that slopes jump:", kinks(program.problem), 4)
+        lines += [*bent, f"{WAY_OUT}."] if bent else []
     if solution.status in (WORDS["Infeasible_Problem_Detected"], WORDS["Not_Enough_Degrees_Of_Freedom"]):
         lines += _list("Depending on each other:", dependent_conditions(program), 6)
     if solution.status != NOT_BEGUN:

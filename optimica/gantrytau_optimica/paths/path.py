@@ -377,8 +377,7 @@ class Way(Model):
     """A point that moves along a path, whose way s is the state.
 
     path: a Path; further keywords modify members: v=Bounds(-0.5, 0.5), a=Bounds(-2.0, 2.0) limit speed and acceleration
-    along it. s has no limits: where a motion begins at one, the search for it takes several times as long, and between
-    conditions at its ends a motion keeps to the path anyway.
+    along it. s has its limits at the ends of the path.
     """
 
     s = Real(unit="m", description="way along the path", prefer=StateSelect.ALWAYS)
@@ -392,7 +391,7 @@ class Way(Model):
                 f"Way: found {path!r}, expected a Path in space; make one with Path.through(points)"
             )
         self.path = path
-        super().__init__(dict(s=dict(start=path.length / 2)), **modifications)
+        super().__init__(dict(s=dict(start=path.length / 2, min=0.0, max=path.length)), **modifications)
 
     def equations(self):
         yield self.r == self.path(self.s)

@@ -10,6 +10,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.switches import Switch
 from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
+from gantrytau_optimica.failures.following_ends import without_following
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
@@ -209,6 +210,14 @@ def solved_by_arcs(
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
     held = held_at_limits(program, trajectories) if known else program
+    if np.sum(held.lbg == held.ubg) > np.sum(
+        held.lbw < held.ubw
+    ):  # each arc at a limit leaves less to choose
+        problem = without_following(replace(optimum.built, problem=problem))
+        program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+        held = held_at_limits(program, trajectories) if known else program
+    if np.sum(held.lbg == held.ubg) > np.sum(held.lbw < held.ubw):
+        return None
     better = solve(held, warm_start(trajectories, held), hot=True)
     worse = better.objective - optimum.objective > WORSE * optimum.playback.objective_size
     if not better.success or worse:

@@ -22,6 +22,7 @@ from scipy import sparse
 from scipy.sparse.linalg import ArpackError, LinearOperator, SuperLU, eigsh, splu
 
 from gantrytau_optimica.solving.ipopt import Solution, objective_size
+from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.program import Program
 
 NEAR = 1e-6  # of its size or of a limit: what is closer is at the limit
@@ -166,8 +167,8 @@ def _conditions(program: Program, solution: Solution, size: float) -> _Condition
     """Derivatives at the solution divided by the size of the objective; None where they are not finite."""
     scale = program.places.scale
     x, multipliers = solution.w / scale, solution.multipliers / size
-    upper = program.assembled.hess_lag(x, [], 1.0 / size, multipliers).sparse().tocsr()
-    rows = program.assembled.jac_g(x, [])[1].sparse().tocsr()
+    upper = scipy_matrix(program.assembled.hess_lag(x, [], 1.0 / size, multipliers)).tocsr()
+    rows = scipy_matrix(program.assembled.jac_g(x, [])[1]).tocsr()
     if not (np.all(np.isfinite(upper.data)) and np.all(np.isfinite(rows.data))):
         return None
     low, high = x - program.lbw, program.ubw - x

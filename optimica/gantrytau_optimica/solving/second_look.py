@@ -12,6 +12,7 @@ import numpy as np
 
 from gantrytau_optimica.solving.curvature import least_curvature
 from gantrytau_optimica.solving.ipopt import Solution
+from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.program import Program
 
 ASIDE = 0.1  # of its size: how far what moves most along the direction is moved
@@ -47,10 +48,10 @@ def beside_obstacles(program: Program, first: np.ndarray) -> np.ndarray:
     passed[program.lbg == program.ubg] = 0.0
     if not np.any(passed):
         return first
-    slopes = abs(assembled.jac_g(x, [])[1].sparse().tocsr()[np.flatnonzero(passed)])
+    slopes = abs(scipy_matrix(assembled.jac_g(x, [])[1]).tocsr()[np.flatnonzero(passed)])
     steepest = slopes.max(axis=0).toarray().ravel()
     if not np.any(steepest[slopes.indices] <= LEVEL):
         return first
-    bent = assembled.hess_lag(x, [], 0.0, passed).sparse().diagonal()
+    bent = scipy_matrix(assembled.hess_lag(x, [], 0.0, passed)).diagonal()
     aside = (steepest <= LEVEL) & (bent < -BENT)
     return np.clip(np.where(aside, x + ASIDE, x), program.lbw, program.ubw) * scale

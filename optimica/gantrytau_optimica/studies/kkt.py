@@ -15,12 +15,12 @@ weights Pirnay, Lopez-Negrete, Biegler (2012), Optimal sensitivity based on IPOP
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, onenormest, splu
 
 from gantrytau_optimica.solving.ipopt import Solution
+from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.program import Program
 
 CLEAR = (
@@ -126,7 +126,7 @@ def stationarity(program: Program, solution: Solution) -> float:
     """The largest entry of the gradient of the Lagrangian, of unknowns that are not fixed, relative to its terms."""
     scale = program.places.scale
     found = program.assembled.grad_f(solution.w / scale, [])[1]
-    jacobian = program.assembled.jac_g(solution.w / scale, [])[1].sparse()
+    jacobian = scipy_matrix(program.assembled.jac_g(solution.w / scale, [])[1])
     gradient = np.array(found).ravel()
     terms = jacobian.T @ solution.multipliers
     total = gradient + terms + solution.bound_multipliers * scale
@@ -138,8 +138,8 @@ def _derivatives(program: Program, w: np.ndarray, multipliers: np.ndarray) -> tu
     """Gradient (n,) of the objective, Jacobian of the rows, Hessian of the Lagrangian, in scaled unknowns."""
     assembled = program.assembled
     gradient = np.array(assembled.grad_f(w, [])[1]).ravel()
-    jacobian = ca.DM(assembled.jac_g(w, [])[1]).sparse().tocsr()
-    upper = ca.DM(assembled.hess_lag(w, [], 1.0, multipliers)).sparse().tocsr()
+    jacobian = scipy_matrix(assembled.jac_g(w, [])[1]).tocsr()
+    upper = scipy_matrix(assembled.hess_lag(w, [], 1.0, multipliers)).tocsr()
     return gradient, jacobian, (upper + sparse.triu(upper, 1).T).tocsr()
 
 

@@ -198,3 +198,11 @@ def to_dm(matrix: Sparse) -> ca.DM:
     columns.sort_indices()
     pattern = ca.Sparsity(matrix.shape[0], matrix.shape[1], columns.indptr.tolist(), columns.indices.tolist())
     return ca.DM(pattern, columns.data)
+
+
+def scipy_matrix(matrix: ca.DM) -> Sparse:
+    """A matrix of CasADi as one of SciPy; `DM.sparse` is None where Ctrl-C is pressed while it asks Python for SciPy."""
+    pattern = matrix.sparsity()
+    return sparse.csc_matrix(
+        (np.array(matrix.nonzeros()), pattern.row(), pattern.colind()), shape=matrix.shape
+    )

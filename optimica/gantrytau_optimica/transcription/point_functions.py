@@ -151,9 +151,18 @@ def places_of_points(
             if not inside_only and not fixed:
                 value = min(max(value, 0.0), 1.0)
             if not -1e-6 <= value <= 1 + 1e-6:
+                ends = ca.vertcat(layout.phase.start_time, layout.phase.final_time)
+                leaves = {leaf.element_hash() for leaf in ca.symvar(ends)}
+                numbers = [(n.name, x) for n, x in zip(problem.free, free, strict=True)
+                           if n.symbol.element_hash() in leaves and not n.held]  # fmt: skip
+                here = ", ".join(f"{name} = {x:.6g}" for name, x in numbers)
                 raise ModelError(
-                    f"{problem.name}: at({point.time}, ...): lies outside of the horizon, at {value:.6g} of its length; "
-                    "choose a time inside of it"
+                    f"{problem.name}: at({point.time}, ...): lies outside of the horizon, at {value:.6g} of its length"
+                    + (
+                        f" with the guess {here}; guess it so that the time lies inside, as the first number of Free(...)"
+                        if numbers and not fixed
+                        else "; choose a time inside of it"
+                    )
                 )
             (element,), (inside,) = Mesh(here).locate(np.array([value]))
             fixed = fixed and (not layout.knots.size or min(value, 1 - value) < 1e-12)

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from gantrytau import Input, Model, Parameter, Real, between, der, table
-from gantrytau_optimica import Optimization, final, initial, optimize
+from gantrytau_optimica import Free, Optimization, final, initial, optimize
 
 xs = np.array([0.0, 0.4, 1.1, 1.5, 2.3, 3.0])
 ys = np.array([0.1, 0.9, 1.7, 1.6, 0.4, 0.2])
@@ -81,3 +81,40 @@ def test_a_table_that_is_a_line_gives_the_motion_of_the_line(kind):
         optimize(type("Held", (Held,), {"cart": model()}), elements=10).objective for model in (Sprung, Line)
     ]
     assert abs(costs[0] - costs[1]) < 1e-7 * costs[1]
+
+
+class Dragged(Cart):
+    """With a drag that is known up to 0.5 m/s."""
+
+    def equations(self):
+        yield der(self.s) == self.v
+        drag = table(self.v, [0.0, 0.3, 0.5], [0.0, 0.05, 0.1], outside="error")
+        yield self.m * der(self.v) == self.u - drag * self.one
+
+    one = Parameter(1.0, unit="N")
+
+
+class FastDragged(Optimization):
+    """1 m from rest to rest, which would be faster beyond 0.5 m/s."""
+
+    cart, final_time = Dragged(s=dict(start=0.0)), Free(2.0, unit="s", min=0.1)
+
+    def objective(self):
+        return self.final_time
+
+    def constraints(self):
+        yield between(-1.0, self.cart.u, 1.0)
+        yield final(self.cart.s) == 1.0
+        yield final(self.cart.v) == 0
+
+
+def test_a_motion_stays_where_its_table_is_defined():
+    found = optimize(FastDragged)
+    # u = 1 up to 0.5 m/s, held there, u = -1: times and ways are quadratures of dv / v' and v dv / v'
+    v, width = (np.arange(100000) + 0.5) * 5e-6, 5e-6
+    drag = np.interp(v, [0.0, 0.3, 0.5], [0.0, 0.05, 0.1])
+    inverse = 1 / (1 - drag) + 1 / (1 + drag)
+    duration = width * inverse.sum() + (1 - width * (v * inverse).sum()) / 0.5
+    assert found.final_time == pytest.approx(duration, abs=3e-4)  # both switches inside of elements of 0.05 s
+    assert np.max(found["cart.v"]) < 0.5 + 1e-6
+    assert "cart.v at its upper limit 0.5" in found.report()

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Bounds, Real, StateSelect, between, der, translate
+from gantrytau import Bounds, Model, ModelError, Parameter, Real, StateSelect, between, der, translate
 from gantrytau.language.functions import dot
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
@@ -140,3 +140,49 @@ def test_speed_and_acceleration_along_the_path_are_limited():
     np.testing.assert_allclose(
         np.linalg.norm(found["robot.tool.v"], axis=1), np.abs(found["way.v"]), atol=1e-5
     )
+
+
+class Point(Model):
+    """A point that goes where it is put."""
+
+    r = Real(3, unit="m")
+
+
+class OnCircle(Optimization):
+    """As far as accelerations of 1 m/s2 lead in 3 s along a quarter of a circle of 1 m, from rest."""
+
+    angles = np.linspace(0.0, np.pi / 2, 30)
+    point = Point()
+    way = Way(Path.through(np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])))
+    final_time = Parameter(3.0, unit="s")
+    given = ("way.a",)
+
+    def equations(self):
+        yield self.point.r == self.way.r
+
+    def objective(self):
+        return -final(self.way.s)
+
+    def constraints(self):
+        yield between(-1, self.way.a, 1)
+        yield initial(self.way.s) == 0
+        yield initial(self.way.v) == 0
+
+
+def test_a_motion_ends_where_its_path_does():
+    # without an end of the path it would go 4.5 m
+    found = optimize(OnCircle, elements=10)
+    assert found["way.s"][-1] == pytest.approx(np.pi / 2, abs=1e-5)
+    np.testing.assert_allclose(found["point.r"][-1], [0.0, 1.0, 0.0], atol=1e-5)
+
+
+def test_an_end_beyond_the_path_is_refused_with_its_length():
+    class Beyond(OnCircle):
+        def constraints(self):
+            yield from super().constraints()
+            yield final(self.way.s) == 2.5
+
+    with pytest.raises(
+        ModelError, match=r"final\(way.s\) == 2.5` lies outside of the limits of way.s, 0 to 1.5707"
+    ):
+        optimize(Beyond)

@@ -167,6 +167,17 @@ def test_a_time_outside_of_a_fixed_horizon():
         assert f"at({late}, ...): lies outside of the horizon" in message(Late)
 
 
+def test_a_time_that_only_the_guess_leaves_outside_names_the_guess():
+    class Late(FastestMass):
+        final_time = Free(1.0, unit="s", min=0.1)
+
+        def constraints(self):
+            yield from super().constraints()
+            yield at(1.5, self.mass.x) >= 0.5
+
+    assert "at 1.5 of its length with the guess final_time = 1; guess it so" in message(Late)
+
+
 def test_nothing_to_choose():
     class Empty(Optimization):
         """Nothing at all."""

@@ -25,6 +25,7 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.archive.fingerprint import hashes, plain, versions
 from gantrytau_optimica.answers.archive.saved_optimum import SavedOptimum, SavedPhase
 from gantrytau_optimica.answers.program_answer import ProgramAnswer
+from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.layout import Track, lagrange
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -240,7 +241,9 @@ def _affine(phase: Trajectory, expressions: ca.SX) -> tuple[np.ndarray, Any, np.
     rows = expressions[np.flatnonzero(~bent).tolist()] if not bent.all() else ca.SX(0, 1)
     evaluate = ca.Function("affine", [signals], [ca.jacobian(rows, signals), ca.densify(rows)])
     slopes, offsets = evaluate(ca.DM.zeros(signals.numel()))
-    matrix = slopes.sparse().tocoo() if slopes.numel() else sparse.coo_matrix((rows.numel(), signals.numel()))
+    matrix = (
+        scipy_matrix(slopes).tocoo() if slopes.numel() else sparse.coo_matrix((rows.numel(), signals.numel()))
+    )
     return ~bent, matrix, np.array(offsets).ravel()
 
 

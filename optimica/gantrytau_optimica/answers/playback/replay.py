@@ -2,8 +2,10 @@
 
     dx/ds = h f(t0 + h s, x, z, u(s)),  0 = g(...),  0 <= s <= 1        on every piece between two borders
 
-Inputs are the polynomials of the solution, so a piece is smooth; CVODES or IDAS integrates it to a tolerance far
-below that of the transcription.
+Inputs are the polynomials of the solution, so a piece is smooth. CVODES or IDAS begins anew on each, so that their errors
+add up over pieces, and an unstable plant makes them grow: so what 17 places resolve is polished there by sweeps of Picard,
+
+    x(s) <- x(0) + h int_0^s f(x) ds        whose errors fall by a factor of h |df/dx|, to rounding
 """
 
 from dataclasses import dataclass
@@ -18,6 +20,8 @@ from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
+AGREED = 1e-6  # of its size: by how much a first sweep may change a state
+RESOLVED = 1e-12  # of its size: what the highest polynomials have of the rate of a state
 TOLERANCE = 1e-10
 PLACES = 0.5 - 0.5 * np.cos(
     np.pi * np.arange(17) / 16
@@ -77,18 +81,24 @@ class Replayed(Record):
     def integral(self, expressions: ca.SX) -> np.ndarray:
         """Integrals of expressions over the phase, (m,), by Clenshaw's and Curtis' weights."""
         rows = self.values(expressions).reshape(expressions.numel(), -1, PLACES.size)
-        return np.einsum("mpk,k,p->m", rows, _weights(PLACES), np.diff(self.pieces, axis=1)[:, 0])
+        return np.einsum("mpk,k,p->m", rows, INTEGRALS[-1], np.diff(self.pieces, axis=1)[:, 0])
 
 
-def _weights(places: np.ndarray) -> np.ndarray:
-    """Weights of the quadrature on [0, 1] that is exact for polynomials through the places."""
-    powers = np.arange(places.size)
-    shifted = np.polynomial.legendre.legvander(2 * places - 1, places.size - 1)
-    exact = np.where(powers == 0, 1.0, 0.0)
-    return np.linalg.solve(shifted.T, exact)
+def _partial_integrals(places: np.ndarray) -> np.ndarray:
+    """Weights (n, n) of the integrals from 0 to each place, exact for polynomials through the places."""
+    primitives = np.polynomial.legendre.legint(np.eye(places.size), lbnd=-1, axis=0)
+    return (np.polynomial.legendre.legval(2 * places - 1, primitives).T / 2) @ _transform(places)
 
 
-def replay(built: Built, trajectory: Trajectory, tolerance: float = TOLERANCE) -> Replayed:
+def _transform(places: np.ndarray) -> np.ndarray:
+    """From values at places to shares of the polynomials of Legendre, (n, n)."""
+    return np.linalg.inv(np.polynomial.legendre.legvander(2 * places - 1, places.size - 1))
+
+
+INTEGRALS, HIGHEST = _partial_integrals(PLACES), _transform(PLACES)[-2:]
+
+
+def replay(built: Built, trajectory: Trajectory) -> Replayed:
     """Integrate a phase with the inputs of the solution, from the solution's start."""
     phase = trajectory.phase
     pieces, owner = _pieces(trajectory)
@@ -179,11 +189,13 @@ def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """An integrator over a piece, and the algebraics it leaves out."""
+    """An integrator over a piece, and what it leaves out."""
 
     integrator: ca.Function
     kept: np.ndarray  # numbers of the algebraics that the integrator solves for
-    others: ca.Function  # (place, x, kept z, p) -> all algebraics
+    equations: (
+        ca.Function
+    )  # (place, x, kept z, p) -> all algebraics, rates by the place, residuals, their slopes by z
 
     def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
         """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
@@ -192,8 +204,32 @@ class _System:
         if not np.all(np.isfinite(x)):
             raise RuntimeError("not finite")
         kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size)
-        z = np.array(self.others(PLACES[None, :], x, kept, p))
-        return x.T, z.T
+        x, kept = self._polished(x, kept, p, sizes[:, None])
+        return x.T, self._values(x, kept, p)[0].T
+
+    def _values(self, x: np.ndarray, kept: np.ndarray, p: np.ndarray) -> list[np.ndarray]:
+        return [np.array(one) for one in self.equations(PLACES[None, :], x, kept, p)]
+
+    def _polished(self, x: np.ndarray, kept: np.ndarray, p: np.ndarray, sizes: np.ndarray):
+        """States and algebraics after sweeps that change states ever less, each with a step of Newton's method for the
+        algebraics; as they were where the places do not resolve the rates.
+        """
+        begun, last = (x, kept), AGREED
+        while True:
+            if kept.size:
+                _, _, residuals, slopes = self._values(x, kept, p)
+                matrices = slopes.reshape(kept.shape[0], PLACES.size, kept.shape[0]).swapaxes(0, 1)
+                try:
+                    kept = kept - np.linalg.solve(matrices, residuals.T[..., None])[..., 0].T
+                except np.linalg.LinAlgError:  # singular at one of the places
+                    return begun
+            rates = self._values(x, kept, p)[1]
+            swept = x[:, :1] + rates @ INTEGRALS.T
+            change = float(np.max(np.abs(swept - x) / sizes))
+            if not change < last / 2:
+                resolved = np.max(np.abs(rates @ HIGHEST.T) / sizes) < RESOLVED
+                return (x, kept) if resolved else begun
+            x, last = swept, change
 
 
 def _system(built: Built, trajectory: Trajectory) -> _System:
@@ -229,13 +265,14 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     z = ca.vertcat(ca.SX(0, 1), *(symbols[i] for i in kept))
     p = ca.vertcat(values, begin, span, problem.numbers)
     scaled = ca.SX.sym("scaled", x.numel())
-    ode, residuals = ca.substitute([ode * span / nominal, residuals], [x], [scaled * nominal])
+    rates, slopes = ode * span, ca.jacobian(residuals, z)
+    equations = [ca.densify(one) for one in (algebraics, rates, residuals, slopes)]
+    ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000, "show_eval_warnings": False}
+    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000}
+    options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
     if not kept:
         del dae["z"], dae["alg"]
     method = "idas" if kept else "cvodes"
     integrator = ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options)
-    return _System(
-        integrator, np.array(kept, int), ca.Function("others", [place, x, z, p], [ca.densify(algebraics)])
-    )
+    return _System(integrator, np.array(kept, int), ca.Function("equations", [place, x, z, p], equations))
