@@ -74,8 +74,9 @@ class MeasuredPlan(Record):
         where = np.flatnonzero(plan.measured)
         turns = plan.kind != "three links"
         every = PoseArrays(plan.q[where], plan.r[where], plan.R[where] if turns else None)
-        rows = self.rows[np.setdiff1d(found.rows, found.left_out)]
-        rows = rows[rows >= 0]
+        kept = np.setdiff1d(found.rows, found.left_out)
+        kept = kept[self.rows[kept] >= 0]
+        rows = self.rows[kept]
         fitted = PoseArrays(every.q[rows], every.r[rows], None if every.R is None else every.R[rows])
         return tool_error(
             cell.robot,
@@ -85,6 +86,7 @@ class MeasuredPlan(Record):
             angle=float(plan.prediction.noise_angle),
             tape=cell.tape,
             orientation=orientation,
+            certainty=found.measurements.select(kept).certainty,
         )
 
     def judged(

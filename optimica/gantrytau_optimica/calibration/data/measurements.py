@@ -20,6 +20,7 @@ from gantrytau_optimica.calibration.data.findings import Finding
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _COVARIANCE = {"cxx": (0, 0), "cxy": (0, 1), "cxz": (0, 2), "cyy": (1, 1), "cyz": (1, 2), "czz": (2, 2)}
+LEAST_SPREAD = 0.1  # of the mean, along an axis: no device is that much surer along one
 _ACTUATOR = re.compile(r"q[1-9]\d*")
 
 
@@ -171,6 +172,18 @@ class Measurements(Record):
             return None
         size = np.sqrt(np.trace(self.covariance, axis1=1, axis2=2))
         return np.nan_to_num(np.nanmedian(size) / size, nan=1.0)
+
+    @property
+    def spreads(self) -> np.ndarray | None:
+        """Square roots of the covariances of positions, (N, 3, 3): 1 on the diagonal for one alike along all axes and of median
+        size; None where all are as sure.
+        """
+        if self.covariance is None:
+            return None
+        size = np.sqrt(np.trace(self.covariance, axis1=1, axis2=2))
+        values, axes = np.linalg.eigh(np.nan_to_num(3 * self.covariance / np.nanmedian(size) ** 2))
+        values = np.maximum(values, LEAST_SPREAD**2 * values.mean(axis=1, keepdims=True))
+        return (axes * np.sqrt(values)[:, None]) @ np.swapaxes(axes, 1, 2)
 
 
 def is_all(rows: np.ndarray, count: int) -> bool:

@@ -100,12 +100,14 @@ def predict(
     angle: float = 0.0,
     tape: float = TAPE,
     orientation: Orientation = "local",
+    certainty: np.ndarray | None = None,
 ) -> Prediction:
     """The error of the tool to be expected after calibration by some of the candidates.
 
     measurements: candidates, as for `select_poses`, rows: those that are measured, or a mask of them, all if None; at: the
     poses to predict for, candidates if None; noise, angle: standard deviations of the measured pose per axis, in m and
-    rad; tape: of nominal parameters, in m at the joints.
+    rad; tape: of nominal parameters, in m at the joints; certainty: (N,) of those that are measured, by which their
+    deviations are divided.
     Raises ModelError for another robot or arrays that do not fit, SolveError at a singular pose.
     """
     check_deviations(noise, angle, tape)
@@ -118,7 +120,7 @@ def predict(
         )
     chosen = poses if rows is None else _rows_of(poses, np.searchsorted(finite, rows))
     there = poses if at is None else _candidates(robot, at, orientation)[1]
-    covariance = _parameter_covariance(arms, chosen, (noise, angle), tape)
+    covariance = _parameter_covariance(arms, chosen, (noise, angle), tape, certainty)
     return _predicted(_gains(arms, there), covariance)
 
 
@@ -216,7 +218,11 @@ def _well_conditioned(blocks: Sequence[np.ndarray], n: int) -> np.ndarray:
 
 
 def _parameter_covariance(
-    arms: Sequence[ArmClosure], poses: PoseArrays, noise: tuple[float, float], tape: float
+    arms: Sequence[ArmClosure],
+    poses: PoseArrays,
+    noise: tuple[float, float],
+    tape: float,
+    certainty: np.ndarray | None = None,
 ) -> np.ndarray:
     """Covariance of all unknowns after a fit, arms one after another, (p, p).
 
@@ -226,6 +232,7 @@ def _parameter_covariance(
     for arm in arms:
         scale = scales(arm)
         J = arm.closure(*poses)[1] * scale
+        J = J if certainty is None else J * certainty[:, None, None]
         rows = J.reshape(-1, arm.count)
         inverse = np.linalg.inv(rows.T @ rows + least**2 * np.eye(arm.count)) * scale[:, None]
         slopes = pose_rows([arm], *poses) * deviations(noise, poses.R)

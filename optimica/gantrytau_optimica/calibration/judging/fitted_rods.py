@@ -137,12 +137,19 @@ class FittedRods(Record):
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of one coordinate of a measured position that explains what is left, m."""
-        return float(np.sqrt(np.mean(np.concatenate(link_noise(self.fits, self.loss)) ** 2)))
+        """Standard deviation of one coordinate of a measured position that explains what is left, m; of one of median
+        covariance where measurements say how sure each is.
+        """
+        found = link_noise(self.fits, self.loss, self._fitted.spreads)
+        return float(np.sqrt(np.mean(np.concatenate(found) ** 2)))
+
+    @property
+    def _fitted(self) -> Measurements:
+        return self.measurements.select(self.rows)
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        return joint_covariance(self.fits, self.loss)
+        return joint_covariance(self.fits, self.loss, self._fitted.spreads)
 
     def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
         """Covariance (k, k) of parameters in their order; a vector's name stands for its three elements.
@@ -227,8 +234,10 @@ class FittedRods(Record):
 
     @property
     def error(self) -> np.float64:
-        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted."""
-        return _mean(self.errors[~np.isin(self.held_out, self.left_out)])
+        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted. Poses that were told to
+        be surer count by the squares of their certainty.
+        """
+        return self._mean(self.errors)
 
     @cached_property
     def angle_errors(self) -> np.ndarray:
@@ -242,7 +251,11 @@ class FittedRods(Record):
     @property
     def angle_error(self) -> np.float64:
         """Mean of `angle_errors`, rad, without `left_out`; NaN where no orientations were measured."""
-        return _mean(self.angle_errors[~np.isin(self.held_out, self.left_out)])
+        return self._mean(self.angle_errors)
+
+    def _mean(self, values: np.ndarray) -> np.float64:
+        good = ~np.isin(self.held_out, self.left_out)
+        return mean_by_worth(values[good], self._held_out.select(good).certainty)
 
     @property
     def plate_turns(self) -> bool:
@@ -250,11 +263,13 @@ class FittedRods(Record):
         return any(link.R is not None for fit in self.fits for link in fit.group.chains)
 
     def link_errors(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m."""
-        found = []
+        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m, of surer
+        poses by as much more.
+        """
+        found, sure = [], self._fitted.certainty
         for fit in self.fits:
             for chain, e in zip(fit.group.chains, fit.distances().T, strict=True):
-                found.append((chain.name, chain.q, e))
+                found.append((chain.name, chain.q, e if sure is None else e * sure))
         return found
 
     @cached_property
@@ -271,7 +286,11 @@ class FittedRods(Record):
         return rows, link_systems(self.fits, self.measurements.select(rows))
 
 
-def _mean(values: np.ndarray) -> np.float64:
-    """The mean of what is finite, NaN of nothing."""
-    finite = values[np.isfinite(values)]
-    return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
+def mean_by_worth(values: np.ndarray, certainty: np.ndarray | None) -> np.float64:
+    """The mean of what is finite, NaN of nothing, by the squares of the certainty of each where it is known."""
+    finite = np.isfinite(values)
+    if not finite.any():
+        return np.float64(np.nan)
+    if certainty is None:
+        return np.float64(values[finite].mean())
+    return np.float64(np.average(values[finite], weights=certainty[finite] ** 2))

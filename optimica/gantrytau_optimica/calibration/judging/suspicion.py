@@ -70,16 +70,18 @@ def suspicion(
     mask[fitted] = mask[held_out] = True
     used = np.flatnonzero(mask)
     fits, bad = list(fits), used[:0]
+    sure = measurements.select(fitted).certainty
+    sure = 1.0 if sure is None else sure
     sizes, typical = relative_distances(fits, measurements, used, fitted)
     # among many poses a mistake in a few is seen without nominal values
     if (len(used) < MANY or (sizes > OUTLIER).any()) and (
         coarse := far_rows(nominal, measurements, used)
     ).size:
-        fits = [fit_group(fit.group, 1.0 - np.isin(fitted, coarse)) for fit in fits]
+        fits = [fit_group(fit.group, sure * (1.0 - np.isin(fitted, coarse))) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     degrees = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
     if (agreeing := agreeing_rows(fits, measurements, fitted, held_out)) is not None:
-        fits = [fit_group(fit.group, np.isin(fitted, agreeing).astype(float)) for fit in fits]
+        fits = [fit_group(fit.group, sure * np.isin(fitted, agreeing)) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     for _ in range(CLEANINGS):
         fresh = used[sizes > limit(degrees)]
@@ -89,7 +91,7 @@ def suspicion(
         weights = 1.0 - np.isin(fitted, bad)
         if weights.sum() < AGREEING * len(weights):
             break
-        fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
+        fits = [fit_group(fit.group, sure * weights, begin=fit.x) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     distances = _distances_of(fits)
 
@@ -142,8 +144,9 @@ def relative_distances(
     for first in range(0, len(rows), BLOCK):
         part = slice(first, first + BLOCK)
         parts.append(distances(whole.q[part], whole.r[part], None if whole.R is None else whole.R[part]))
+    sure = 1.0 if whole.certainty is None else whole.certainty
     spread = _spread(fits, whole, np.isin(rows, fitted)) if len(rows) < MANY else 1.0
-    return standardised(np.concatenate(parts, axis=1), spread)
+    return standardised(sure * np.concatenate(parts, axis=1), spread)
 
 
 def _distances_of(
@@ -169,7 +172,7 @@ def _distances(links: Sequence[RodLink], q: np.ndarray, r: np.ndarray, R: np.nda
 
 def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.ndarray:
     """sqrt(1 -+ h) of the links, in their order, (links, N)."""
-    found = []
+    found, sure = [], None if data.certainty is None else data.certainty[:, None]
     for fit in fits:
         minimum, scale = fit.minimum, fit.group.scale[fit.group.free]
         here = fit.group if fitted.all() else fit.group.over(data.q, data.r, data.R)
@@ -180,6 +183,7 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
         lost = minimum.directions[minimum.rank :] / not_held(fit) * scale if minimum.cost > 0 else held[:0]
         for k, link in enumerate(here.chains):
             J = here.slopes(fit.x, k)
+            J = J if sure is None else J * sure
             own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
             h = own.sum(axis=1)
             spread = np.where(used, np.maximum(1.0 - h, LEAST), 1.0 + h + other.sum(axis=1))

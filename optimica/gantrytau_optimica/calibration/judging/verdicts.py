@@ -209,7 +209,7 @@ def _shared(found: FittedRods) -> Iterator[Finding]:
     data = found.measurements.select(found.rows)
     if data.covariance is None:
         return
-    foretold = float(np.sqrt(np.mean(np.trace(data.covariance, axis1=1, axis2=2))))
+    foretold = float(np.sqrt(np.nanmedian(np.trace(data.covariance, axis1=1, axis2=2))))
     left = np.sqrt(3) * found.noise
     if foretold > SHARED * left:
         words = (

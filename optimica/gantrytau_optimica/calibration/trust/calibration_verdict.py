@@ -96,9 +96,8 @@ def expected_error(found: Calibration, *, tape: float = TAPE, noise: float | Non
     """
     data = found.measurements.select(found.rows)
     poses = PoseArrays(data.q, data.r, data.R if found.plate_turns else None)
-    return tool_error(
-        found.robot, poses, poses, noise=float(found.noise if noise is None else noise), tape=tape
-    )
+    noise = float(found.noise if noise is None else noise)
+    return tool_error(found.robot, poses, poses, noise=noise, tape=tape, certainty=data.certainty)
 
 
 def _validated(checked: CrossValidation) -> str:

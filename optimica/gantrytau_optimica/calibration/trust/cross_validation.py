@@ -11,6 +11,7 @@ from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.judging.fitted_rods import mean_by_worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +28,17 @@ class CrossValidation(Record):
     @property
     def good(self) -> np.ndarray:
         """The errors without gross ones, which a robust loss leaves without weight, (n,) in m."""
-        errors = np.delete(self.errors, self.calibration.left_out)
-        return errors[np.isfinite(errors)]
+        return self.errors[self._kept]
+
+    @property
+    def _kept(self) -> np.ndarray:
+        rows = np.delete(np.arange(len(self.errors)), self.calibration.left_out)
+        return rows[np.isfinite(self.errors[rows])]
 
     @property
     def error(self) -> float:
-        """Their mean, m; NaN where no pose was left out of a fit."""
-        return float(self.good.mean()) if self.good.size else float("nan")
+        """Their mean, m, of surer poses by as much more; NaN where no pose was left out of a fit."""
+        return float(mean_by_worth(self.good, self.calibration.measurements.select(self._kept).certainty))
 
     def __repr__(self) -> str:
         count = f"{self.good.size} poses that were not fitted"
