@@ -8,7 +8,6 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
@@ -35,6 +34,7 @@ from gantrytau_optimica.calibration.rods.error_models import (
     started_linear,
 )
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
+from gantrytau_optimica.fitting.finding import Finding
 
 
 def calibrate(

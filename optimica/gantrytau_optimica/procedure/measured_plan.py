@@ -12,7 +12,6 @@ from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.device_frames import Motion
@@ -24,6 +23,7 @@ from gantrytau_optimica.calibration.trust.calibration_verdict import (
     um,
 )
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
 from gantrytau_optimica.procedure.trials import matched

@@ -15,7 +15,7 @@ from gantrytau.kinematics.rotations import of_quaternions, quaternions
 from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")

@@ -11,7 +11,6 @@ from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
@@ -32,6 +31,7 @@ from gantrytau_optimica.calibration.rods.arm_kinematics import ArmKinematics
 from gantrytau_optimica.calibration.rods.error_models import COMMON
 from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.fitting.finding import Finding
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,9 @@ from gantrytau_optimica.calibration.judging.link_systems import freedom, link_sy
 from gantrytau_optimica.calibration.judging.masked_rows import AGREEING, masked_rows
 from gantrytau_optimica.calibration.judging.plausibility import BETTER, NEAR, Misses
 from gantrytau_optimica.calibration.rods.forward import BLOCK, RodLink
+from gantrytau_optimica.fitting.robust import OUTLIER, limit
 
 CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
-OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
-CHANCE = 1e-6  # that noise of few poses exceeds the limit
 MANY = 2000  # poses, from which on h is negligible
 LOOKED_AT = 100  # poses fitted, and as many held out, among which masked ones are looked for
 LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
@@ -38,13 +37,6 @@ class Suspicion(Record):
     rows: np.ndarray
     misses: Misses
     typical: float
-
-
-def limit(freedom: float) -> float:
-    """How many robust standard deviations noise does not reach, where `freedom` errors showed it."""
-    from scipy.special import stdtrit
-
-    return max(OUTLIER, float(stdtrit(max(1.0, freedom), 1.0 - CHANCE)))
 
 
 def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.ndarray, float]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
+from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.causes import ordered, pulled, scaled
@@ -23,6 +23,7 @@ from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.rods.error_models import ModelLink, links_of_arms, moved
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from gantrytau import GantryTauError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.tool_error import Loose, ToolError, tool_error
 from gantrytau_optimica.calibration.rods.groups import TAPE
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
+from gantrytau_optimica.fitting.finding import Finding
 
 SHOWN = 3  # combinations that are named
 NOTHING_MEASURED = 1e3  # m, noise with which poses tell nothing

@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau import GantryTauError
 from gantrytau.kinematics.rotations import angle_between
-from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.adjustment import adjusted, started
 from gantrytau_optimica.vision.reconstruction.bundle import PRIOR, Bundle, State

@@ -8,9 +8,9 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.scenes.scene import AHEAD
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
