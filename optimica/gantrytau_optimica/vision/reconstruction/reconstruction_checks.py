@@ -90,6 +90,24 @@ def check_words(
     return scale
 
 
+def check_facing(detections: Detections, rows: np.ndarray) -> None:
+    """VisionError where a camera sees the pattern from behind, as in mirrored images."""
+    points = detections.pattern.points[:, :2]
+    for c, corners in enumerate(detections.corners[:, rows]):
+        seen = np.isfinite(corners[..., :1])
+        count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
+        away = np.where(seen, corners, 0.0)
+        away = np.where(seen, away - away.sum(axis=1, keepdims=True) / count, 0.0)
+        # the images of right and up turn about each other the other way, as pixels count downwards
+        behind = np.linalg.det(np.swapaxes(away, 1, 2) @ points) > 0
+        known = seen.any(axis=(1, 2))
+        if behind[known].sum() > known.sum() / 2:
+            raise VisionError(
+                f"reconstruct: camera {c + 1} sees the pattern from behind in {rows_in_words(rows[known & behind])}, expected "
+                "from the front; its images are mirrored, or its corners are numbered the other way round: flip them"
+            )
+
+
 def usable_poses(detections: Detections) -> np.ndarray:
     """Rows of poses that two cameras saw, or the only one; VisionError for fewer than ten, with what lost the others."""
     needed = min(2, len(detections.size))
