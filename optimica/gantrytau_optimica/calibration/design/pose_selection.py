@@ -27,6 +27,7 @@ from gantrytau_optimica.calibration.design.identifiability import (
     finite_poses,
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
+from gantrytau_optimica.calibration.fitting.pose_residuals import named_slopes
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_factors import NOISE, checked_poses, scales
 from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, tool_gain
@@ -65,24 +66,31 @@ def select_poses(
     method: Method = "d-optimal",
     seed: int = 0,
     orientation: Orientation = "local",
+    parameters: Sequence[str] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> np.ndarray:
     """The rows of n poses to measure, ascending, (n,).
 
     measurements: candidates, a record with q, r and R, or a tuple of them; rows that are not finite are not chosen;
     method: "d-optimal", "tool" for the least error of its position over the candidates, "condition" for (5.9), or
-    "random"; seed: of the poses that exchange begins with.
+    "random"; seed: of the poses that exchange begins with; parameters, joints: of any robot, as of `calibrate`.
     Raises ModelError for another method, robot or number, and for arrays that do not fit.
     """
     if method not in METHODS:
         raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
-    arms, poses, rows = _candidates(robot, measurements, orientation)
+    if parameters is None:
+        arms, poses, rows = _candidates(robot, measurements, orientation)
+    else:
+        poses, rows = finite_poses(measurements)
+        J = named_slopes(robot, parameters, joints, poses)
+        rows, J = rows[np.isfinite(J).all(axis=(1, 2))], J[np.isfinite(J).all(axis=(1, 2))]
     if not (isinstance(n, int | np.integer) and 0 < n <= len(rows)):
         raise ModelError(
             f"n: found {n!r}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
         )
     start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
     if method != "random":
-        blocks, weights = _blocks(arms, poses)
+        blocks, weights = _blocks(arms, poses) if parameters is None else _held([J], [J[:, :3]])
         if method == "condition":
             start = _well_conditioned(blocks, n)
         else:
@@ -191,10 +199,16 @@ def _rows_of(poses: PoseArrays, rows: np.ndarray) -> PoseArrays:
 
 def _blocks(arms: Sequence[ArmClosure], poses: PoseArrays) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """J S of each arm, (N, m, rank), and W, (rank, rank), in the directions that all candidates together determine."""
+    pairs = list(zip(arms, tool_gain(arms, *poses), strict=True))
+    return _held(
+        [J * scales(arm) for arm, (_, J) in pairs], [gain[:, :3] * scales(arm) for arm, (gain, _) in pairs]
+    )
+
+
+def _held(slopes: list[np.ndarray], gains: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     blocks, weights = [], []
-    for arm, (gain, J) in zip(arms, tool_gain(arms, *poses), strict=True):
-        J, gain = J * scales(arm), gain[:, :3] * scales(arm)
-        _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, arm.count), mode="r"), full_matrices=False)
+    for J, gain in zip(slopes, gains, strict=True):
+        _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, J.shape[2]), mode="r"), full_matrices=False)
         V = V[s > NOTHING * s[0]]
         rows = (gain @ V.T).reshape(-1, len(V))
         blocks.append(J @ V.T)

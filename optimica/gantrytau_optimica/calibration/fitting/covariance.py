@@ -17,27 +17,35 @@ import numpy as np
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
+LEAST = 0.1  # of the squares of what is left, that are at the least no errors which poses share
 MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
 
 
-def link_noise(fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None) -> list[np.ndarray]:
+def link_noise(
+    fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None, shared: np.ndarray | None = None
+) -> list[np.ndarray]:
     """Standard deviations of a measured coordinate, in m, one for each link of each fit; pooled where they are alike.
 
-    Of a robust fit from the median of the amounts. spreads: `Measurements.spreads` of the fitted poses, (N, 3, 3): then of a
-    pose of median size.
+    Of a robust fit from the median of the amounts. spreads, shared: `Measurements.spreads` and `.shared` of the fitted
+    poses: then of a pose of median size, by what is left beside errors that poses share.
     """
     found, counts = [], []
     for fit in fits:
         distances = fit.distances()
         if spreads is not None:
             along = [link.by_pose(fit.group.numbers(k, fit.x))[0] for k, link in enumerate(fit.group.chains)]
-            distances = distances / np.column_stack([_seen(u, spreads) for u in along])
+            seen = np.column_stack([_seen(u, spreads) for u in along])
+            distances = distances / seen
         share = fit.minimum.rank / distances.shape[1]
         freedom = max(1.0, len(distances) - share)
         if loss == "robust":
             squares = (1.4826 * np.median(np.abs(distances), axis=0)) ** 2
         else:
-            squares = np.sum(distances**2, axis=0) / freedom
+            squares = np.sum(distances**2, axis=0)
+            if spreads is not None and shared is not None:
+                known = np.minimum(_shared_squares(fit, along, shared, seen), (1 - LEAST) * squares)
+                squares = squares - known
+            squares = squares / freedom
         found.append(squares)
         counts.append(np.full(len(squares), freedom))
     squares, weights = np.concatenate(found), np.concatenate(counts)
@@ -46,6 +54,16 @@ def link_noise(fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None
     if np.all(np.abs(squares / pooled - 1) < ALIKE * np.sqrt(2 / weights)):
         found = [np.full(len(one), pooled) for one in found]
     return [np.sqrt(one) for one in found]
+
+
+def _shared_squares(fit: Fit, along: list[np.ndarray], shared: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """What errors that poses share leave of the squares of distances of each link, once numbers followed them, (links,)."""
+    unit = [np.linalg.norm(u, axis=1) * f for u, f in zip(along, seen.T, strict=True)]
+    X = np.stack([np.einsum("ni,nik->nk", u, shared) / s[:, None] for u, s in zip(along, unit, strict=True)])
+    J = np.stack([fit.group.slopes(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
+    Q = np.linalg.qr(J.reshape(-1, J.shape[2]) * fit.group.scale[fit.group.free])[0]
+    flat = X.reshape(-1, X.shape[2])
+    return np.sum((flat - Q @ (Q.T @ flat)).reshape(X.shape) ** 2, axis=(1, 2))
 
 
 def _seen(u: np.ndarray, spreads: np.ndarray) -> np.ndarray:
@@ -90,16 +108,25 @@ def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.array([alone[0], 0.0]) if left[0] <= left[1] else np.array([0.0, alone[1]])
 
 
-def joint_covariance(fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None) -> np.ndarray:
+def joint_covariance(
+    fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None, shared: np.ndarray | None = None
+) -> np.ndarray:
     """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold.
 
-    spreads: as of `link_noise`.
+    spreads: as of `link_noise`; shared: `Measurements.shared` of the fitted poses, F (N, 3, k), which moves all of them at
+    once by u F.
     """
     parts = [(f, k) for f, fit in enumerate(fits) for k in range(len(fit.group.chains))]
     starts = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
     middle = np.zeros((starts[-1], starts[-1]))
-    moved = _moved(fits, parts, loss, spreads)
+    moved = _moved(fits, parts, loss, spreads, shared)
     rows = [_slopes(fits[f], k) for f, k in parts]
+    if shared is not None:
+        together = np.zeros((starts[-1], shared.shape[2]))
+        for (f, k), J in zip(parts, rows, strict=True):
+            u = fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]])[0]
+            together[starts[f] : starts[f + 1]] += J.T @ np.einsum("ni,nik->nk", u, shared)
+        middle += together @ together.T
     for a, (f, _) in enumerate(parts):
         for b, (g, _) in enumerate(parts[: a + 1]):
             block = (np.einsum("ij,ij->i", moved[a], moved[b])[:, None] * rows[a]).T @ rows[b]
@@ -119,7 +146,11 @@ def joint_covariance(fits: Sequence[Fit], loss: str, spreads: np.ndarray | None 
 
 
 def _moved(
-    fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str, spreads: np.ndarray | None
+    fits: Sequence[Fit],
+    parts: list[tuple[int, int]],
+    loss: str,
+    spreads: np.ndarray | None,
+    shared: np.ndarray | None,
 ) -> list[np.ndarray]:
     """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
     turned = [fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
@@ -128,7 +159,7 @@ def _moved(
         worse = np.sqrt(np.trace(spreads @ spreads, axis1=1, axis2=2) / 3)[:, None]
         turned = [(_through(u, spreads), worse * w) for u, w in turned]
     if loss == "robust" or not any(w.any() for _, w in turned):
-        noises = np.concatenate(link_noise(fits, loss, spreads))
+        noises = np.concatenate(link_noise(fits, loss, spreads, shared))
         return [s * np.hstack([u, 0 * w]) for s, (u, w) in zip(noises, turned, strict=True)]
     errors = np.column_stack(
         [fits[f].group.chains[k].error(fits[f].x[fits[f].group.places[k]]) for f, k in parts]

@@ -21,6 +21,10 @@ ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
 def ordered(found: FittedRods) -> Iterator[Finding]:
     """What changed from one row on, with the order of the rows, or from row to row."""
+    if (
+        found.measurements.shared is not None
+    ):  # errors that poses have in common follow the order of their places
+        return
     used, systems = found.systems(LOOKED_AT)
     r, fitted = found.measurements.r[used], np.flatnonzero(np.isin(used, found.rows))
     smooth = smooth_functions(r[fitted])

@@ -66,6 +66,14 @@ class FittedRods(Record):
             f"{len(self.rows)} poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
         )
 
+    def without_strays(self) -> Self:
+        """The same by the rows that close as others do, for what is judged beside wrong ones."""
+        bad = self.suspicion.rows
+        if not bad.size or self.loss == "robust":
+            return self
+        rows, held_out = (np.setdiff1d(each, bad) for each in (self.rows, self.held_out))
+        return replace(self, fits=self.suspicion.fits, rows=rows, held_out=held_out)
+
     def with_findings(self, findings: Sequence[Finding]) -> Self:
         """The same with other findings, without working anything out anew."""
         return self._kept(replace(self, findings=tuple(findings)), "findings")
@@ -95,6 +103,16 @@ class FittedRods(Record):
             return {}
         motion = self.motion or Motion(np.eye(3), np.zeros(3))
         return {"frame.R": motion.rotation, "frame.t": motion.translation}
+
+    @property
+    def robot_name(self) -> str:
+        """What the robot is called."""
+        return self.nominal_rods.name
+
+    @property
+    def nominal_values(self) -> Mapping[str, Any]:
+        """What parameters were before."""
+        return self.nominal_rods.values
 
     @property
     def arms(self) -> tuple[ArmClosure, ...]:
@@ -140,7 +158,7 @@ class FittedRods(Record):
         """Standard deviation of one coordinate of a measured position that explains what is left, m; of one of median
         covariance where measurements say how sure each is.
         """
-        found = link_noise(self.fits, self.loss, self._fitted.spreads)
+        found = link_noise(self.fits, self.loss, self._fitted.spreads, self._fitted.shared)
         return float(np.sqrt(np.mean(np.concatenate(found) ** 2)))
 
     @property
@@ -149,7 +167,7 @@ class FittedRods(Record):
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        return joint_covariance(self.fits, self.loss, self._fitted.spreads)
+        return joint_covariance(self.fits, self.loss, self._fitted.spreads, self._fitted.shared)
 
     def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
         """Covariance (k, k) of parameters in their order; a vector's name stands for its three elements.
@@ -170,9 +188,10 @@ class FittedRods(Record):
             if wanted:
                 lost = [n for n in wanted if n in self.undetermined]
                 if lost:
+                    advice = "turn the plate more between" if self.plate_turns else "measure more"
                     raise ModelError(
-                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; turn the plate "
-                        "more between poses, or give a prior"
+                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; {advice} "
+                        "poses, or give a prior"
                     )
                 return [self.names.index(n) for n in wanted]
         if name in self._frame():
@@ -234,8 +253,8 @@ class FittedRods(Record):
 
     @property
     def error(self) -> np.float64:
-        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted. Poses that were told to
-        be surer count by the squares of their certainty.
+        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted. Poses that were told
+        to be surer count by the squares of their certainty.
         """
         return self._mean(self.errors)
 

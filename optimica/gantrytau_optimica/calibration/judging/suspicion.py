@@ -31,12 +31,13 @@ LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
 @dataclass(frozen=True)
 class Suspicion(Record):
     """rows: those that close too badly; misses: how links identified without them close; typical: robust standard
-    deviation of the closure errors of the others, of the worst link, m.
+    deviation of the closure errors of the others, of the worst link, m; fits: without them, by weights 0.
     """
 
     rows: np.ndarray
     misses: Misses
     typical: float
+    fits: tuple[Fit, ...] = ()
 
 
 def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -90,7 +91,7 @@ def suspicion(
     def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
         return np.abs(distances(q, r, R)).max(axis=0)
 
-    return Suspicion(bad, misses, typical)
+    return Suspicion(bad, misses, typical, tuple(fits))
 
 
 def agreeing_rows(

@@ -193,14 +193,16 @@ def judged(found: FittedRods) -> list[Finding]:
             f"deviations; {advice}"
         )
         findings.append(Finding("outliers", others, words))
-    findings += ordered(found)
+    others = found.without_strays()
+    findings += ordered(others)
     return [
         *findings,
         *_misfit(found, seen, findings),
         *pulled(found),
         *scaled(found),
-        *_far(found),
+        *_far(others),
         *_in_doubt(found),
+        *_undetermined(others),
         *_shared(found),
     ]
 
@@ -271,6 +273,9 @@ def _in_doubt(found: FittedRods) -> Iterator[Finding]:
             "prior={name: deviation}"
         )
         yield Finding("not converged", found.rows, words)
+
+
+def _undetermined(found: FittedRods) -> Iterator[Finding]:
     if found.undetermined:
         advice = (
             "turn the plate more" if found.plate_turns else "measure more poses, spread over the workspace"

@@ -67,7 +67,8 @@ def read_nominal(robot: Any) -> NominalRods:
     if rods is None or not rods.arms:
         raise ModelError(
             f"calibrate: found {type(robot).__name__} that does not say what its rods are, expected a robot such as "
-            "GantryTau(prototypes.L1); give the model a method rods() that returns Rods([RodArm(...), ...])"
+            "GantryTau(prototypes.L1); name what is to be found, parameters=['upper.r'], of any other robot, or give the "
+            "model a method rods() that returns Rods([RodArm(...), ...])"
         )
     values = _written(robot, rods.parameters) or _declared(robot, rods) or _flattened(robot, rods)
     return NominalRods(robot, rods, values)

@@ -12,6 +12,7 @@ from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.judging.fitted_rods import mean_by_worth
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +23,7 @@ class CrossValidation(Record):
     always fitted or not usable.
     """
 
-    calibration: Calibration
+    calibration: Calibration | NamedCalibration
     errors: np.ndarray
 
     @property
@@ -45,7 +46,7 @@ class CrossValidation(Record):
         return f"<CrossValidation: {self.error * 1e6:.3g} um in the mean of {count}>"
 
 
-def held_out(calibration: Calibration) -> CrossValidation:
+def held_out(calibration: Calibration | NamedCalibration) -> CrossValidation:
     """By the poses that `calibrate` held out; all NaN if it fitted all of them."""
     errors = np.full(len(calibration.measurements), np.nan)
     if not np.array_equal(calibration.held_out, calibration.rows):

@@ -90,7 +90,8 @@ def reconstruct(
             steps += more
     state, placed = places(bundle, state, fitted, distances)
     poses = left_by_poses(bundle, state)
-    placed = replace(placed, covariance=placed.covariance * poses.beyond(1 / float(bundle.weights.max())))
+    beyond = poses.beyond(1 / float(bundle.weights.max()))
+    placed = replace(placed, covariance=beyond * placed.covariance, shared=np.sqrt(beyond) * placed.shared)
     found = _of_all_poses(bundle, state, placed, rows, detections)
     noticed += suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
     if not any(each.kind == "images" for each in noticed):
@@ -133,12 +134,14 @@ def _of_all_poses(
     points = detections.corners.shape[2]
     r, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     R, residuals = np.full((count, 3, 3), np.nan), np.full((cameras, count, points, 2), np.nan)
-    r[rows], covariance[rows], R[rows] = placed.r, placed.covariance, state.R
+    shared = np.full((count, *placed.shared.shape[1:]), np.nan)
+    r[rows], covariance[rows], shared[rows], R[rows] = placed.r, placed.covariance, placed.shared, state.R
     residuals[:, rows] = bundle.residuals(state)
     return Reconstruction(
         r=r,
         R=R,
         covariance=covariance,
+        shared=shared,
         cameras=state.cameras,
         rms=float(np.sqrt(np.nanmean(residuals**2))),
         residuals=residuals,

@@ -103,8 +103,8 @@ def check_facing(detections: Detections, rows: np.ndarray) -> None:
         known = seen.any(axis=(1, 2))
         if behind[known].sum() > known.sum() / 2:
             raise VisionError(
-                f"reconstruct: camera {c + 1} sees the pattern from behind in {rows_in_words(rows[known & behind])}, expected "
-                "from the front; its images are mirrored, or its corners are numbered the other way round: flip them"
+                f"reconstruct: camera {c + 1} sees the pattern from behind in {rows_in_words(rows[known & behind])}, "
+                "expected from the front; its images are mirrored, or corners numbered the other way round: flip them"
             )
 
 

@@ -1,4 +1,4 @@
-"""Images that do not belong to their pose, and offsets that all corners of an image share: what each pose leaves beside others.
+"""Images that do not belong to their pose, and offsets that all corners of an image share: what poses leave beside others.
 
     e = A d + X s + noise       d: unknowns of the pose; s: shifts of its images, X: 1 for their corners
     G = (X'e)'(X'X)^-1(X'e)     X beside A: what shifts explain of the squares; W = |e|^2 - G: of the shapes
@@ -109,7 +109,7 @@ def _taken_by(bundle: Bundle, state: State, pose: int, sigma: float) -> tuple[in
     for c in cameras:
         weights = one.weights.copy()
         weights[c] = 0.0
-        rest, there = _settled(replace(one, weights=weights), state.of(np.array([pose])))
+        _, there = _settled(replace(one, weights=weights), state.of(np.array([pose])))
         left = one.residuals(there)[:, 0] / sigma
         alone[c] = float(np.nansum(left[np.arange(len(left)) != c] ** 2))
         own = left[c] - np.nanmedian(left[c], axis=0)
@@ -141,8 +141,8 @@ def other_moments(found: PoseFit, rows: Array) -> list[Finding]:
         return []
     words = (
         f"all corners of an image are off alike, by {found.shared:.3g} times as much as corners that err alone ("
-        f"{found.sigma:.2g} pixel each) would be: cameras look at different moments while the plate moves, or one of them was "
-        "moved; trigger them together, or let the plate stand; covariances count it"
+        f"{found.sigma:.2g} pixel each) would be: cameras look at different moments while the plate moves, or one of "
+        "them was moved; trigger them together, or let the plate stand; covariances count it"
     )
     return [Finding("moments", rows, words)]
 

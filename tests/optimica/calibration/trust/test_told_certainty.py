@@ -63,7 +63,7 @@ def test_the_verdict_counts_poses_by_what_they_are_worth(poses):
 
 
 def test_a_worse_pose_that_is_off_by_more_than_was_told_is_an_outlier(poses):
-    q, r = poses
+    q, _ = poses
     far = measured(poses, 100.0)
     off = far.r.copy()
     off[8, 0] += 0.02  # told 1 mm

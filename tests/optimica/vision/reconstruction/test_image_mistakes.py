@@ -108,6 +108,6 @@ def test_mirrored_images_are_told(cameras):
     corners = IMAGES.corners.copy()
     corners[cameras, ..., 0] = 1023 - corners[cameras, ..., 0]
     with pytest.raises(
-        VisionError, match="camera 1 sees the pattern from behind in .* its images are mirrored"
+        VisionError, match=r"camera 1 sees the pattern from behind in .* its images are mirrored"
     ):
         reconstruct(of(corners=corners), BOTH)
