@@ -154,8 +154,9 @@ class NamedCalibration(Record):
         if residuals.data.shared is not None:
             shared = residuals.frame(x)[0] @ residuals.data.shared
             moved = np.hstack([moved, np.einsum("nij,nik->jk", J[:, :3], shared)])
-        for i, (_, deviation) in residuals.prior.items():
-            moved = np.hstack([moved, (self.noise**2 / deviation * np.eye(len(x))[i])[:, None]])
+        pulled = self.minimum.slopes[len(self.minimum.slopes) - len(residuals.prior) :] / residuals.scale
+        for row, (_, deviation) in zip(pulled, residuals.prior.values(), strict=True):
+            moved = np.hstack([moved, (row * np.abs(row).max() * deviation)[:, None]])
         half = held.T @ (held @ moved)
         return half @ half.T
 

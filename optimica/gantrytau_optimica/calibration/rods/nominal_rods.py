@@ -131,6 +131,11 @@ def _flattened(robot: Model, rods: Rods) -> dict[str, np.ndarray]:
 
 def with_numbers(robot: Model, values: Mapping[str, Any]) -> Model:
     """The robot with other numbers for parameters by name, such as `arms[0].links[1].length`."""
+    return robot.modified(modifications_of(robot, values))
+
+
+def modifications_of(robot: Model, values: Mapping[str, Any]) -> Any:
+    """Numbers by name as nested modifications of the robot."""
     tree: dict[Any, Any] = {}
     for name, value in values.items():
         *way, last = [key or int(index) for key, index in _PARTS.findall(name)]
@@ -138,7 +143,7 @@ def with_numbers(robot: Model, values: Mapping[str, Any]) -> Model:
         for part in way:
             branch = branch.setdefault(part, {})
         branch[last] = float(value) if np.ndim(value) == 0 else [float(x) for x in value]
-    return robot.modified(_as_modifications(tree, robot.modifications))
+    return _as_modifications(tree, robot.modifications)
 
 
 def _as_modifications(tree: Any, old: Any) -> Any:
