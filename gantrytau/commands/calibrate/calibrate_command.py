@@ -189,7 +189,9 @@ def calibrate(
         calibration_files.rehearse(folder)
         nominal = _robot(file, robot, prototype, set_ or ())
         if parameters and nominal.planned is not None:
-            raise CommandError(f"{file}: the plan beside it is of a robot on rods; leave --parameters out, or give --robot")
+            raise CommandError(
+                f"{file}: the plan beside it is of a robot on rods; leave --parameters out, or give --robot"
+            )
         measured = MeasurementFile.read(file, rail_files(rails))
         finish(nominal, measured, how, folder, validate=holdout is None, json=json)
 

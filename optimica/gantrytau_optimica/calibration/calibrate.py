@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -37,6 +37,37 @@ from gantrytau_optimica.calibration.rods.error_models import (
 )
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
 from gantrytau_optimica.fitting.finding import Finding
+
+
+@overload
+def calibrate(
+    robot: Model,
+    measurements: Measurements,
+    *,
+    model: Literal["parallel", 1, 2, 3, 4, 5] | None = ...,
+    method: Literal["gauss-newton", "ipopt"] = ...,
+    start: Literal["nominal", "linear"] = ...,
+    orientation: Literal["local", "unit", "free"] = ...,
+    prior: Mapping[str, Any] | None = ...,
+    loss: Literal["linear", "robust"] = ...,
+    holdout: Any = ...,
+    constraints: Mapping[str, Any] | None = ...,
+    frame: Literal["fitted", "base"] = ...,
+) -> Calibration: ...
+
+
+@overload
+def calibrate(
+    robot: Model,
+    measurements: Measurements,
+    *,
+    parameters: Sequence[str],
+    joints: Sequence[str] | None = ...,
+    prior: Mapping[str, Any] | None = ...,
+    loss: Literal["linear", "robust"] = ...,
+    holdout: Any = ...,
+    frame: Literal["fitted", "base"] = ...,
+) -> NamedCalibration: ...
 
 
 def calibrate(

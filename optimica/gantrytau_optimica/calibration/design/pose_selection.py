@@ -80,17 +80,18 @@ def select_poses(
         raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
     if parameters is None:
         arms, poses, rows = _candidates(robot, measurements, orientation)
+        blocks, weights = ([], []) if method == "random" else _blocks(arms, poses)
     else:
         poses, rows = finite_poses(measurements)
         J = named_slopes(robot, parameters, joints, poses)
-        rows, J = rows[np.isfinite(J).all(axis=(1, 2))], J[np.isfinite(J).all(axis=(1, 2))]
+        there = np.isfinite(J).all(axis=(1, 2))
+        rows, (blocks, weights) = rows[there], _held([J[there]], [J[there, :3]])
     if not (isinstance(n, int | np.integer) and 0 < n <= len(rows)):
         raise ModelError(
             f"n: found {n!r}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
         )
     start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
     if method != "random":
-        blocks, weights = _blocks(arms, poses) if parameters is None else _held([J], [J[:, :3]])
         if method == "condition":
             start = _well_conditioned(blocks, n)
         else:

@@ -31,21 +31,19 @@ def link_noise(
     """
     found, counts = [], []
     for fit in fits:
-        distances = fit.distances()
+        distances, known = fit.distances(), 0.0
         if spreads is not None:
             along = [link.by_pose(fit.group.numbers(k, fit.x))[0] for k, link in enumerate(fit.group.chains)]
             seen = np.column_stack([_seen(u, spreads) for u in along])
             distances = distances / seen
+            known = 0.0 if shared is None else _shared_squares(fit, along, shared, seen)
         share = fit.minimum.rank / distances.shape[1]
         freedom = max(1.0, len(distances) - share)
         if loss == "robust":
             squares = (1.4826 * np.median(np.abs(distances), axis=0)) ** 2
         else:
             squares = np.sum(distances**2, axis=0)
-            if spreads is not None and shared is not None:
-                known = np.minimum(_shared_squares(fit, along, shared, seen), (1 - LEAST) * squares)
-                squares = squares - known
-            squares = squares / freedom
+            squares = np.maximum(squares - known, LEAST * squares) / freedom
         found.append(squares)
         counts.append(np.full(len(squares), freedom))
     squares, weights = np.concatenate(found), np.concatenate(counts)

@@ -32,12 +32,12 @@ class ToolFunction(Record):
     @cached_property
     def scale(self) -> Array:
         """What of each parameter moves a tool by about a metre, (k,)."""
-        units = [unit for name in self.names for unit in [self._unit(name)]]
+        units = [self._unit(name) for name in self.names]
         known = {"m": 1.0, "rad": 1 / LEVER}
         return np.array([known.get(u, max(abs(x), 1.0)) for u, x in zip(units, self.nominal, strict=True)])
 
     def _unit(self, name: str) -> str:
-        return next((p.unit for p in self.dae.flat.parameters if name in p.elements), "1")
+        return next((p.unit for p in self.dae.flat.parameters if name in p.elements), None) or "1"
 
     def __call__(self, q: Array, p: Array) -> tuple[Array, Array | None]:
         """Places (N, 3) and orientations (N, 3, 3) of the tool, on the branch of the start; NaN where there is none."""

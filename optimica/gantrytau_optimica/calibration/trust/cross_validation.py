@@ -19,11 +19,12 @@ from gantrytau_optimica.calibration.named.named_calibration import NamedCalibrat
 class CrossValidation(Record):
     """A calibration, and how far poses lie from where fits without them expect them.
 
-    calibration: with all that was fitted; errors: distances by row of the measurements, (N,) in m, NaN where a row was
+    calibration: with all that was fitted, as of `calibrate`.
+    errors: distances by row of the measurements, (N,) in m, NaN where a row was
     always fitted or not usable.
     """
 
-    calibration: Calibration | NamedCalibration
+    calibration: Any
     errors: np.ndarray
 
     @property

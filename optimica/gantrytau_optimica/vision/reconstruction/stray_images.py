@@ -88,10 +88,10 @@ def stray_images(bundle: Bundle, state: State) -> list[tuple[int, tuple[int, ...
     usual = max(1.0, float(np.median(found.shifts)) / CHI_2)
     spread = NORMAL * float(np.median(np.abs(found.shapes - 1.0)))
     wrong = (found.shifts > OUTLIER * usual) | (found.shapes > max(SHAPE, 1.0 + OUTLIER * spread))
-    poses = np.flatnonzero(wrong)
+    poses = np.flatnonzero(wrong).tolist()
     if len(poses) > MOST * len(wrong):
         return []
-    return [(int(k), _taken_by(bundle, state, k, found.sigma * usual)) for k in poses]
+    return [(k, _taken_by(bundle, state, k, found.sigma * usual)) for k in poses]
 
 
 def _taken_by(bundle: Bundle, state: State, pose: int, sigma: float) -> tuple[int, ...]:
@@ -155,13 +155,14 @@ def _as_plates(bundle: Bundle, state: State) -> tuple[Bundle, State]:
     view = replace(bundle, told=told, weights=np.ones_like(bundle.weights))
     state = replace(state, middles=np.zeros((0, 3)), offsets=np.zeros(0))
     if not bundle.told.plate:
-        seen = np.isfinite(bundle.pixels[..., 0]).sum(axis=0) > 1
-        r, R = plates(np.where(seen[..., None], state.corners, np.nan), bundle.points)
+        twice = np.isfinite(bundle.pixels[..., 0]).sum(axis=0) > 1
+        r, R = plates(np.where(twice[..., None], state.corners, np.nan), bundle.points)
         R = np.broadcast_to(mean_rotation(R), R.shape).copy() if told.alike else R
         size = float(np.median(extents(state.corners)) / extents(bundle.points[None])[0])
         state = replace(state, r=r, R=R, size=size)
-    left = np.where(view.seen.any(axis=2)[..., None, None], view.residuals(state), 0.0)
-    beside = np.linalg.norm(left - np.nanmedian(left, axis=2, keepdims=True), axis=-1)
+    seen = np.asarray(view.seen.any(axis=2))[..., None, None]
+    left = np.where(seen, view.residuals(state), 0.0)
+    beside = np.asarray(np.linalg.norm(left - np.nanmedian(left, axis=2, keepdims=True), axis=-1))
     far = beside > OUTLIER * max(float(np.nanmedian(beside[view.seen > 0])), LEAST_SIGMA)
     far &= far.sum(axis=2, keepdims=True) < 0.25 * view.seen.sum(axis=2, keepdims=True)
     return replace(view, weights=view.seen * ~far), state
