@@ -23,8 +23,8 @@ ORDER = {  # a room imports the rooms before it
     "simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy given prepared optimize "
-    "studies estimation paths calibration procedure identification learning vision __init__",
-    "gantrytau_optimica.calibration": "data rods fitting design judging report calibration calibrate "
+    "studies fitting estimation paths calibration procedure identification learning vision __init__",
+    "gantrytau_optimica.calibration": "data rods fitting design judging report named calibration calibrate "
     "devices trust surveys __init__",
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies fleet workspace_resolution candidates pose_choice "
     "trials ways plan_verdict pose_plan documents calibration_plan plan_calibration cells measured_plan",

@@ -8,7 +8,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.file_lines import in_lines
-from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding
+from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
@@ -37,6 +37,7 @@ from gantrytau_optimica.calibration.trust.parameter_rows import (
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.excitation.design_excitation import design_excitation
 from gantrytau_optimica.identification.excitation.excitation_result import Excitation
 from gantrytau_optimica.identification.friction.friction_result import Friction

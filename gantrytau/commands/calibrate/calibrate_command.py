@@ -10,6 +10,7 @@ from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
 from gantrytau.commands.arguments.shell_offers import words
+from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.calibrate import calibration_files
 from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
@@ -60,6 +61,21 @@ Prior = Annotated[
         show_default=False,
     ),
 ]
+Names = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--parameters",
+        metavar="NAME,...",
+        help="Parameters of any robot that are to be found, by their names in the model, as upper.r,fore.r.",
+        show_default="the rods of the robot",
+    ),
+]
+Joints = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME,...", help="With --parameters: columns of q.", show_default="the joints that are driven"
+    ),
+]
 Constraints = Annotated[
     list[str] | None,
     typer.Option(
@@ -104,6 +120,8 @@ def calibrate(
         ),
     ] = "local",
     prior: Prior = None,
+    parameters: Names = None,
+    joints: Joints = None,
     constraint: Constraints = None,
     robust: Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")] = False,
     holdout: Annotated[
@@ -158,6 +176,7 @@ def calibrate(
             )
         if file.suffix.lower() == ".toml":
             others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior, frame=frame)
+            others |= dict(parameters=parameters, joints=joints)
             _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
             plan(file, output, json)
             return
@@ -165,9 +184,14 @@ def calibrate(
             raise CommandError(f"{file}: there is no such file{_kinds(file)}")
         words = dict(method=method, start=start, orientation=orientation, frame=frame)
         how = policy(words, model, holdout or "second", prior, constraint or (), robust)
+        how |= dict(parameters=listed(parameters) or None, joints=listed(joints) or None)
         folder = output or calibration_files.folder_beside(file)
         calibration_files.rehearse(folder)
         nominal = _robot(file, robot, prototype, set_ or ())
+        if parameters and nominal.planned is not None:
+            raise CommandError(
+                f"{file}: the plan beside it is of a robot on rods; leave --parameters out, or give --robot"
+            )
         measured = MeasurementFile.read(file, rail_files(rails))
         finish(nominal, measured, how, folder, validate=holdout is None, json=json)
 

@@ -11,6 +11,7 @@ from gantrytau.commands.printing.spelling import Spelling
 SPELLING = Spelling(
     ("calibrate", "Measurements"),
     {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior", "frame")}
+    | {"parameters": "--parameters", "joints": "--joints"}
     | {"constraints": "--constraint", "rails": "--rails", "robot": "--robot", "loss": "--robust"}
     | {"kind": "--example"},
     flags=("loss",),
@@ -18,6 +19,8 @@ SPELLING = Spelling(
         "model=None": "no --model",
         "holdout=None": "--holdout none",
         "prior={name: deviation}": "--prior NAME=DEVIATION",
+        "parameters=['upper.r']": "--parameters upper.r",
+        "out of parameters=": "out of --parameters",
         "rails=[...] in Measurements": "--rails rail1.csv,rail2.csv,rail3.csv",
     },
 )

@@ -26,7 +26,8 @@ def about(
     """What a report says besides the calibration. robot: its name; checked: fits without each part of the poses in turn."""
     from gantrytau_optimica import About
 
-    turned = found.nominal_rods.turns or measured.data.R is not None
+    rods = getattr(found, "nominal_rods", None)  # robots on three rods do not turn their plate
+    turned = rods is None or rods.turns or measured.data.R is not None
     of_tool = turned or (plan is not None and np.any(plan.target))  # laid over the plan t holds the target
     target = "the target that was measured, in the place of the tool; t of a frame holds its offset"
     facts = {"measurements": str(measured.path), **(plan.facts if plan else {})}
@@ -80,7 +81,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
     errors = found.errors[good] * 1e6
     kept = "of the fit itself" if np.array_equal(found.held_out, found.rows) else "not fitted"
     typer.echo(
-        f"{found.nominal_rods.name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
+        f"{found.robot_name}: {len(found.names)} numbers identified from {len(found.rows)} poses of "
         f"{measured.path.name}, in {found.iterations} steps"
     )
     typer.echo(
@@ -103,7 +104,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
         typer.echo(f"Written: {file}")
     if not any(file.endswith(PARAMETERS) for file in files):
         typer.echo(
-            f"No {PARAMETERS}: {found.nominal_rods.name} has no parameters for what was identified; the numbers are in "
+            f"No {PARAMETERS}: {found.robot_name} has no parameters for what was identified; the numbers are in "
             "the report"
         )
 

@@ -1,14 +1,13 @@
 """`calibrate`: the parameters of a robot from measured poses."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
@@ -26,7 +25,9 @@ from gantrytau_optimica.calibration.judging.verdicts import (
     not_in_base,
     usable_rows,
 )
-from gantrytau_optimica.calibration.rods.arm_closure import Orientation, arms_of
+from gantrytau_optimica.calibration.named.calibrate_by_names import AskedByName, calibrate_by_names, usable
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
+from gantrytau_optimica.calibration.rods.arm_closure import arms_of
 from gantrytau_optimica.calibration.rods.error_models import (
     check_model,
     links_of_arms,
@@ -35,6 +36,38 @@ from gantrytau_optimica.calibration.rods.error_models import (
     started_linear,
 )
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
+from gantrytau_optimica.fitting.finding import Finding
+
+
+@overload
+def calibrate(
+    robot: Model,
+    measurements: Measurements,
+    *,
+    model: Literal["parallel", 1, 2, 3, 4, 5] | None = ...,
+    method: Literal["gauss-newton", "ipopt"] = ...,
+    start: Literal["nominal", "linear"] = ...,
+    orientation: Literal["local", "unit", "free"] = ...,
+    prior: Mapping[str, Any] | None = ...,
+    loss: Literal["linear", "robust"] = ...,
+    holdout: Any = ...,
+    constraints: Mapping[str, Any] | None = ...,
+    frame: Literal["fitted", "base"] = ...,
+) -> Calibration: ...
+
+
+@overload
+def calibrate(
+    robot: Model,
+    measurements: Measurements,
+    *,
+    parameters: Sequence[str],
+    joints: Sequence[str] | None = ...,
+    prior: Mapping[str, Any] | None = ...,
+    loss: Literal["linear", "robust"] = ...,
+    holdout: Any = ...,
+    frame: Literal["fitted", "base"] = ...,
+) -> NamedCalibration: ...
 
 
 def calibrate(
@@ -50,8 +83,11 @@ def calibrate(
     holdout: Any = "second",
     constraints: Mapping[str, Any] | None = None,
     frame: Literal["fitted", "base"] = "fitted",
-) -> Calibration:
-    """Identify the kinematic parameters of a robot from measured poses by the closure of its links.
+    parameters: Sequence[str] | None = None,
+    joints: Sequence[str] | None = None,
+) -> Calibration | NamedCalibration:
+    """Identify the kinematic parameters of a robot from measured poses: on rods by the closure of its links, of any robot
+    with a tool and driven joints by the names of its parameters.
 
     model: None takes the robot as it is, with a direction for each guideway; "parallel" holds their directions, equal,
     at the nominal value; 1 to 5 are the error models of Table 5.2 (see `models.py`). method: "ipopt" solves the same
@@ -64,37 +100,59 @@ def calibrate(
     "arms[0].length": (2.0, 2.1), "arms[1].links[0].length": "arms[1].links[1].length"} (see `constraints.py`).
     frame: "base" says that poses were measured in the base of the robot, where it is commanded; "fitted" takes them in any
     frame: numbers are identified there, and nominal values say where the base is, `.parameters["frame.R"]`, `["frame.t"]`.
+    parameters: names in the model of any robot, as ["upper.r", "h"]; prior, loss, holdout and frame speak of them, and the
+    frame is fitted beside them. joints: columns of q, by default those that are driven.
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
     _check_words(constraints, method=method, start=start, orientation=orientation, loss=loss, frame=frame)
-    nominal_rods = read_nominal(robot)
-    _check_columns(nominal_rods, measurements, start)
-    check_model(model, nominal_rods, measurements)
+    if parameters is not None:
+        _refuse_for_rods(model, method, start, orientation)
+        return _by_names(robot, measurements, AskedByName(parameters, joints, prior, loss, frame), holdout)
+    asked = _Asked(model, start, prior, loss, orientation, frame)
+    return _on_rods(read_nominal(robot), measurements, asked, method, holdout, constraints)
+
+
+def _by_names(robot: Model, measurements: Measurements, asked: AskedByName, holdout: Any) -> NamedCalibration:
+    _check_measurements(measurements)
+    tool, rows, findings = usable(robot, measurements, asked)
+    return calibrate_by_names(
+        robot, measurements, asked, _split(rows, holdout, measurements), (tool, findings)
+    )
+
+
+def _on_rods(
+    nominal_rods: NominalRods,
+    measurements: Measurements,
+    asked: "_Asked",
+    method: str,
+    holdout: Any,
+    constraints: Mapping[str, Any] | None,
+) -> Calibration:
+    _check_columns(nominal_rods, measurements, asked.start)
+    check_model(asked.model, nominal_rods, measurements)
     findings = list(measurements.findings)
     rows = usable_rows(findings, measurements)
     check_carts(nominal_rods, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
-    data = measurements.select(fitted)
-    asked = _Asked(model, start, prior, loss, orientation, frame)
-    fits, known, there = _fitted(nominal_rods, data, asked, (rows, fitted, findings))
+    fits, known, there = _fitted(nominal_rods, measurements.select(fitted), asked, (rows, fitted, findings))
     fits = fits if method == "gauss-newton" else _by_ipopt(fits, constraints)
     found = Calibration(
         nominal_rods,
         measurements,
-        model,
+        asked.model,
         tuple(fits),
         fitted,
         held_out,
         method,
-        loss,
-        orientation,
+        asked.loss,
+        asked.orientation,
         nominal=known,
-        frame=frame,
+        frame=asked.frame,
         motion=None if there is None else Motion.of(there),
     )
     if constraints:
         found = replace(found, constraints=tuple(read_constraints(constraints, found.names)))
-    told = [] if there is None or start == "linear" else [in_words(there, rows)]
+    told = [] if there is None or asked.start == "linear" else [in_words(there, rows)]
     return found.with_findings([*findings, *told, *judged(found)])
 
 
@@ -112,7 +170,7 @@ class _Asked:
     start: str
     prior: Mapping[str, Any] | None
     loss: str
-    orientation: Orientation
+    orientation: Any
     frame: str
 
 
@@ -177,11 +235,26 @@ def _check_words(constraints: Mapping[str, Any] | None, **words: str) -> None:
         )
 
 
-def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:
+def _refuse_for_rods(*given: Any) -> None:
+    """ModelError for words that speak of rods beside parameters=."""
+    usual = dict(model=None, method="gauss-newton", start="nominal", orientation="local")
+    for (name, word), found in zip(usual.items(), given, strict=True):
+        if found != word:
+            raise ModelError(
+                f"calibrate: found {name}={found!r} with parameters=, expected {word!r}: it speaks of robots on rods",
+                argument=name,
+            )
+
+
+def _check_measurements(measurements: Any) -> None:
     if not isinstance(measurements, Measurements):
         raise ModelError(
             f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
         )
+
+
+def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:
+    _check_measurements(measurements)
     expected = len(robot.rods.joints)
     if measurements.q.shape[1] != expected:
         raise ModelError(

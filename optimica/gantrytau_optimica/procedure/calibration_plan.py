@@ -82,7 +82,8 @@ class CalibrationPlan(PosePlan):
             return moved
         known = np.isfinite(measurements.r).all(axis=1)
         turn, _ = motion(measurements.r[known], found.r[known])
-        return moved.uncertain(turn @ measurements.covariance @ turn.T)
+        shared = None if measurements.shared is None else turn @ measurements.shared
+        return moved.uncertain(turn @ measurements.covariance @ turn.T, shared)
 
     def missing(self, measurements: Measurements) -> np.ndarray:
         """Rows of the program that are to be measured and that measurements do not hold yet, by their q, or by number."""

@@ -12,7 +12,6 @@ from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.device_frames import Motion
@@ -24,6 +23,7 @@ from gantrytau_optimica.calibration.trust.calibration_verdict import (
     um,
 )
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
 from gantrytau_optimica.procedure.trials import matched
@@ -74,8 +74,9 @@ class MeasuredPlan(Record):
         where = np.flatnonzero(plan.measured)
         turns = plan.kind != "three links"
         every = PoseArrays(plan.q[where], plan.r[where], plan.R[where] if turns else None)
-        rows = self.rows[np.setdiff1d(found.rows, found.left_out)]
-        rows = rows[rows >= 0]
+        kept = np.setdiff1d(found.rows, found.left_out)
+        kept = kept[self.rows[kept] >= 0]
+        rows = self.rows[kept]
         fitted = PoseArrays(every.q[rows], every.r[rows], None if every.R is None else every.R[rows])
         return tool_error(
             cell.robot,
@@ -85,6 +86,7 @@ class MeasuredPlan(Record):
             angle=float(plan.prediction.noise_angle),
             tape=cell.tape,
             orientation=orientation,
+            certainty=found.measurements.select(kept).certainty,
         )
 
     def judged(

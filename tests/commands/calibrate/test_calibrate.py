@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gantrytau_models import GantryTau, prototypes
+from gantrytau.kinematics import Kinematics
+from gantrytau_models import FiveBar, GantryTau, prototypes
 from gantrytau_optimica import Measurements
 from gantrytau_optimica import calibrate as calibrate_in_python
 
@@ -364,4 +365,26 @@ def test_constraints_are_kept(answer, fails, measured, poses):
     wrong = ("--method", "ipopt", "--constraint", "arms[7].length=2")
     assert "--constraint: 'arms[7].length' is not identified" in fails(
         MISUSE, "calibrate", file, *ROBOT, *wrong
+    )
+
+
+def test_any_robot_by_the_names_of_its_parameters(run, answer, tmp_path):
+    """Five bars whose cranks are 3 mm too long: found, and written for --set."""
+    built = Kinematics(FiveBar(crank_length=0.303))
+    random = np.random.default_rng(0)
+    q = built.home.q + random.uniform(-0.5, 0.5, (30, 2))
+    r = built.fk(q)[0] + NOISE * random.standard_normal((30, 3))
+    file = tmp_path / "bars.csv"
+    Measurements(q, r).write(file)
+    by_name = ("--robot", "FiveBar", "--holdout", "none", "--parameters")
+    found = answer("calibrate", file, *by_name, "crank_length")
+    assert found["parameters"]["crank_length"] == pytest.approx(
+        0.303, abs=4 * found["deviations"]["crank_length"]
+    )
+    written = tomllib.loads((tmp_path / "bars-calibrated" / "calibrated.toml").read_text())
+    assert written == {"crank_length": found["parameters"]["crank_length"]}
+    wrong = run("calibrate", file, *by_name, "crank_lenght")
+    assert wrong.exit_code == MISUSE
+    assert (
+        "--parameters: FiveBar has no parameter 'crank_lenght'; did you mean 'crank_length'?" in wrong.stderr
     )

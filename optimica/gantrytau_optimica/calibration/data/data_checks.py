@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 
 
 def in_lines(message: str, said: Sequence[np.ndarray], lines: np.ndarray) -> str:

@@ -15,11 +15,12 @@ from gantrytau.kinematics.rotations import of_quaternions, quaternions
 from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _COVARIANCE = {"cxx": (0, 0), "cxy": (0, 1), "cxz": (0, 2), "cyy": (1, 1), "cyz": (1, 2), "czz": (2, 2)}
+LEAST_SPREAD = 0.1  # of the mean, along an axis: no device is that much surer along one
 _ACTUATOR = re.compile(r"q[1-9]\d*")
 
 
@@ -30,7 +31,8 @@ class Measurements(Record):
     the plate (N, 3, 3), world = R @ plate, or unit quaternions (N, 4), scalar first, or None; rails: for each guideway
     (k, 4) the columns q, x, y, z of points measured along it, k from 2, in any frame, or None. numbers: of the poses in
     a plan (N,), or None; lines: of the rows in the file that they were read from (N,), or None; covariance: of r,
-    (N, 3, 3) in m2, where a device says how sure each is (`uncertain`), or None for poses that are all as sure.
+    (N, 3, 3) in m2, where a device says how sure each is (`uncertain`), or None for poses that are all as sure; shared:
+    factors F (N, 3, k) in m of what positions have in common of it, cov(r_i, r_j) = F_i F_j', or None.
     Arrays are copied and cannot be written to. Raises ModelError for shapes that do not fit; what is doubtful about the
     numbers stands in `findings`.
     """
@@ -50,6 +52,7 @@ class Measurements(Record):
         self.numbers = None if numbers is None else np.array(numbers, dtype=int).reshape(len(self.q))
         self.lines: np.ndarray | None = None
         self.covariance: np.ndarray | None = None
+        self.shared: np.ndarray | None = None
         for array in (self.q, self.r, self.R, *(self.rails or ())):
             if array is not None:
                 array.flags.writeable = False
@@ -139,11 +142,13 @@ class Measurements(Record):
         found.numbers = None if self.numbers is None else self.numbers[rows]
         found.lines = None if self.lines is None else self.lines[rows]
         found.covariance = None if self.covariance is None else self.covariance[rows]
+        found.shared = None if self.shared is None else self.shared[rows]
         return found
 
-    def uncertain(self, covariance: Any) -> Self:
+    def uncertain(self, covariance: Any, shared: Any = None) -> Self:
         """The measurements with covariances of their positions, (N, 3, 3) in m2: `calibrate` believes sure ones more.
 
+        shared: F (N, 3, k) in m, the part F_i F_j' that errors of positions have in common, as by cameras.
         Raises ModelError for other shapes, and for covariances of finite positions that are not finite and above zero.
         """
         given = _numbers("covariance", covariance)
@@ -162,15 +167,43 @@ class Measurements(Record):
         found = self.select(slice(None))
         found.covariance = given
         found.covariance.flags.writeable = False
+        if shared is not None:
+            found.shared = _numbers("shared", shared)
+            if found.shared.ndim != 3 or found.shared.shape[:2] != (len(self), 3):
+                raise ModelError(
+                    f"Measurements: found shared of shape {found.shared.shape}, expected ({len(self)}, 3, k) in m"
+                )
         return found
+
+    @property
+    def _own(self) -> np.ndarray:
+        """Covariances of positions without what they share, (N, 3, 3)."""
+        assert self.covariance is not None
+        if self.shared is None:
+            return self.covariance
+        rest = self.covariance - self.shared @ np.swapaxes(self.shared, 1, 2)
+        least = LEAST_SPREAD**2 * np.trace(self.covariance, axis1=1, axis2=2) / 3
+        return rest + np.maximum(least - np.trace(rest, axis1=1, axis2=2) / 3, 0.0)[:, None, None] * np.eye(3)
 
     @property
     def certainty(self) -> np.ndarray | None:
         """Weights of poses, (N,), 1 for one of median covariance; None where all are as sure."""
         if self.covariance is None:
             return None
-        size = np.sqrt(np.trace(self.covariance, axis1=1, axis2=2))
+        size = np.sqrt(np.trace(self._own, axis1=1, axis2=2))
         return np.nan_to_num(np.nanmedian(size) / size, nan=1.0)
+
+    @property
+    def spreads(self) -> np.ndarray | None:
+        """Square roots of the covariances of positions, (N, 3, 3): 1 for one alike along all axes and of median size; None
+        where all are as sure.
+        """
+        if self.covariance is None:
+            return None
+        size = np.sqrt(np.trace(self._own, axis1=1, axis2=2))
+        values, axes = np.linalg.eigh(np.nan_to_num(3 * self._own / np.nanmedian(size) ** 2))
+        values = np.maximum(values, LEAST_SPREAD**2 * values.mean(axis=1, keepdims=True))
+        return (axes * np.sqrt(values)[:, None]) @ np.swapaxes(axes, 1, 2)
 
 
 def is_all(rows: np.ndarray, count: int) -> bool:

@@ -27,6 +27,7 @@ from gantrytau_optimica.calibration.design.identifiability import (
     finite_poses,
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
+from gantrytau_optimica.calibration.fitting.pose_residuals import named_slopes
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.rods.arm_factors import NOISE, checked_poses, scales
 from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, tool_gain
@@ -65,24 +66,32 @@ def select_poses(
     method: Method = "d-optimal",
     seed: int = 0,
     orientation: Orientation = "local",
+    parameters: Sequence[str] | None = None,
+    joints: Sequence[str] | None = None,
 ) -> np.ndarray:
     """The rows of n poses to measure, ascending, (n,).
 
     measurements: candidates, a record with q, r and R, or a tuple of them; rows that are not finite are not chosen;
     method: "d-optimal", "tool" for the least error of its position over the candidates, "condition" for (5.9), or
-    "random"; seed: of the poses that exchange begins with.
+    "random"; seed: of the poses that exchange begins with; parameters, joints: of any robot, as of `calibrate`.
     Raises ModelError for another method, robot or number, and for arrays that do not fit.
     """
     if method not in METHODS:
         raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
-    arms, poses, rows = _candidates(robot, measurements, orientation)
+    if parameters is None:
+        arms, poses, rows = _candidates(robot, measurements, orientation)
+        blocks, weights = ([], []) if method == "random" else _blocks(arms, poses)
+    else:
+        poses, rows = finite_poses(measurements)
+        J = named_slopes(robot, parameters, joints, poses)
+        there = np.isfinite(J).all(axis=(1, 2))
+        rows, (blocks, weights) = rows[there], _held([J[there]], [J[there, :3]])
     if not (isinstance(n, int | np.integer) and 0 < n <= len(rows)):
         raise ModelError(
             f"n: found {n!r}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
         )
     start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
     if method != "random":
-        blocks, weights = _blocks(arms, poses)
         if method == "condition":
             start = _well_conditioned(blocks, n)
         else:
@@ -100,12 +109,14 @@ def predict(
     angle: float = 0.0,
     tape: float = TAPE,
     orientation: Orientation = "local",
+    certainty: np.ndarray | None = None,
 ) -> Prediction:
     """The error of the tool to be expected after calibration by some of the candidates.
 
     measurements: candidates, as for `select_poses`, rows: those that are measured, or a mask of them, all if None; at: the
     poses to predict for, candidates if None; noise, angle: standard deviations of the measured pose per axis, in m and
-    rad; tape: of nominal parameters, in m at the joints.
+    rad; tape: of nominal parameters, in m at the joints; certainty: (N,) of those that are measured, by which their
+    deviations are divided.
     Raises ModelError for another robot or arrays that do not fit, SolveError at a singular pose.
     """
     check_deviations(noise, angle, tape)
@@ -118,7 +129,7 @@ def predict(
         )
     chosen = poses if rows is None else _rows_of(poses, np.searchsorted(finite, rows))
     there = poses if at is None else _candidates(robot, at, orientation)[1]
-    covariance = _parameter_covariance(arms, chosen, (noise, angle), tape)
+    covariance = _parameter_covariance(arms, chosen, (noise, angle), tape, certainty)
     return _predicted(_gains(arms, there), covariance)
 
 
@@ -189,10 +200,16 @@ def _rows_of(poses: PoseArrays, rows: np.ndarray) -> PoseArrays:
 
 def _blocks(arms: Sequence[ArmClosure], poses: PoseArrays) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """J S of each arm, (N, m, rank), and W, (rank, rank), in the directions that all candidates together determine."""
+    pairs = list(zip(arms, tool_gain(arms, *poses), strict=True))
+    return _held(
+        [J * scales(arm) for arm, (_, J) in pairs], [gain[:, :3] * scales(arm) for arm, (gain, _) in pairs]
+    )
+
+
+def _held(slopes: list[np.ndarray], gains: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
     blocks, weights = [], []
-    for arm, (gain, J) in zip(arms, tool_gain(arms, *poses), strict=True):
-        J, gain = J * scales(arm), gain[:, :3] * scales(arm)
-        _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, arm.count), mode="r"), full_matrices=False)
+    for J, gain in zip(slopes, gains, strict=True):
+        _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, J.shape[2]), mode="r"), full_matrices=False)
         V = V[s > NOTHING * s[0]]
         rows = (gain @ V.T).reshape(-1, len(V))
         blocks.append(J @ V.T)
@@ -216,7 +233,11 @@ def _well_conditioned(blocks: Sequence[np.ndarray], n: int) -> np.ndarray:
 
 
 def _parameter_covariance(
-    arms: Sequence[ArmClosure], poses: PoseArrays, noise: tuple[float, float], tape: float
+    arms: Sequence[ArmClosure],
+    poses: PoseArrays,
+    noise: tuple[float, float],
+    tape: float,
+    certainty: np.ndarray | None = None,
 ) -> np.ndarray:
     """Covariance of all unknowns after a fit, arms one after another, (p, p).
 
@@ -226,6 +247,7 @@ def _parameter_covariance(
     for arm in arms:
         scale = scales(arm)
         J = arm.closure(*poses)[1] * scale
+        J = J if certainty is None else J * certainty[:, None, None]
         rows = J.reshape(-1, arm.count)
         inverse = np.linalg.inv(rows.T @ rows + least**2 * np.eye(arm.count)) * scale[:, None]
         slopes = pose_rows([arm], *poses) * deviations(noise, poses.R)

@@ -8,9 +8,9 @@ import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
 from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 ROUNDING = 1e-9  # of a sample: a last instant that rounding puts behind the end is still read
 BENT = 1e-2  # of their length, by which axes are too short halfway between two rotations 16 degrees apart

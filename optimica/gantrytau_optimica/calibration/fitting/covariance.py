@@ -2,11 +2,12 @@
 
     e_ik = |y_ik|^2 - L_i^2,    de_ik = 2 y_ik . dT_k + 2 (R_k B_i x y_ik) . dphi_k = u_ik . dT_k + w_ik . dphi_k
     cov(e_ik, e_jk) = s^2 u_ik . u_jk + a^2 w_ik . w_jk
-    p = -(J'J)^-1 J'e           cov p = (J'J)^-1 J' cov(e) J (J'J)^-1
+    p = -(J'WWJ)^-1 J'WWe       cov p = (J'WWJ)^-1 J'WW cov(e) WWJ (J'WWJ)^-1
 
 Links share the noise of a pose, so that numbers of different links vary together. The deviations s of a coordinate and a
 of a turn about an axis are those with which the products of closure errors agree best. For one link alone this is
-4 s^2 L^2 (J'J)^-1, the Cramer-Rao bound of its closure errors.
+4 s^2 L^2 (J'J)^-1, the Cramer-Rao bound of its closure errors. Where positions have a covariance C of their own, C^1/2 u
+stands for u, C in units of its median size, and w is worse by as much; W are the weights of the fit.
 """
 
 from collections.abc import Sequence
@@ -16,23 +17,33 @@ import numpy as np
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
+LEAST = 0.1  # of the squares of what is left, that are at the least no errors which poses share
 MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
 
 
-def link_noise(fits: Sequence[Fit], loss: str) -> list[np.ndarray]:
+def link_noise(
+    fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None, shared: np.ndarray | None = None
+) -> list[np.ndarray]:
     """Standard deviations of a measured coordinate, in m, one for each link of each fit; pooled where they are alike.
 
-    Of a robust fit from the median of the amounts.
+    Of a robust fit from the median of the amounts. spreads, shared: `Measurements.spreads` and `.shared` of the fitted
+    poses: then of a pose of median size, by what is left beside errors that poses share.
     """
     found, counts = [], []
     for fit in fits:
-        distances = fit.distances()
+        distances, known = fit.distances(), 0.0
+        if spreads is not None:
+            along = [link.by_pose(fit.group.numbers(k, fit.x))[0] for k, link in enumerate(fit.group.chains)]
+            seen = np.column_stack([_seen(u, spreads) for u in along])
+            distances = distances / seen
+            known = 0.0 if shared is None else _shared_squares(fit, along, shared, seen)
         share = fit.minimum.rank / distances.shape[1]
         freedom = max(1.0, len(distances) - share)
         if loss == "robust":
             squares = (1.4826 * np.median(np.abs(distances), axis=0)) ** 2
         else:
-            squares = np.sum(distances**2, axis=0) / freedom
+            squares = np.sum(distances**2, axis=0)
+            squares = np.maximum(squares - known, LEAST * squares) / freedom
         found.append(squares)
         counts.append(np.full(len(squares), freedom))
     squares, weights = np.concatenate(found), np.concatenate(counts)
@@ -41,6 +52,25 @@ def link_noise(fits: Sequence[Fit], loss: str) -> list[np.ndarray]:
     if np.all(np.abs(squares / pooled - 1) < ALIKE * np.sqrt(2 / weights)):
         found = [np.full(len(one), pooled) for one in found]
     return [np.sqrt(one) for one in found]
+
+
+def _shared_squares(fit: Fit, along: list[np.ndarray], shared: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """What errors that poses share leave of the squares of distances of each link, once numbers followed them, (links,)."""
+    unit = [np.linalg.norm(u, axis=1) * f for u, f in zip(along, seen.T, strict=True)]
+    X = np.stack([np.einsum("ni,nik->nk", u, shared) / s[:, None] for u, s in zip(along, unit, strict=True)])
+    J = np.stack([fit.group.slopes(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
+    Q = np.linalg.qr(J.reshape(-1, J.shape[2]) * fit.group.scale[fit.group.free])[0]
+    flat = X.reshape(-1, X.shape[2])
+    return np.sum((flat - Q @ (Q.T @ flat)).reshape(X.shape) ** 2, axis=(1, 2))
+
+
+def _seen(u: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+    """How much more than a pose of median size each pose moves closure errors whose derivatives are u (N, 3), (N,)."""
+    return np.linalg.norm(_through(u, spreads), axis=1) / np.linalg.norm(u, axis=1)
+
+
+def _through(u: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+    return np.einsum("nij,nj->ni", spreads, u)
 
 
 def pose_noise(
@@ -76,13 +106,25 @@ def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.array([alone[0], 0.0]) if left[0] <= left[1] else np.array([0.0, alone[1]])
 
 
-def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
-    """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold."""
+def joint_covariance(
+    fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None, shared: np.ndarray | None = None
+) -> np.ndarray:
+    """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold.
+
+    spreads: as of `link_noise`; shared: `Measurements.shared` of the fitted poses, F (N, 3, k), which moves all of them at
+    once by u F.
+    """
     parts = [(f, k) for f, fit in enumerate(fits) for k in range(len(fit.group.chains))]
     starts = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
     middle = np.zeros((starts[-1], starts[-1]))
-    moved = _moved(fits, parts, loss)
+    moved = _moved(fits, parts, loss, spreads, shared)
     rows = [_slopes(fits[f], k) for f, k in parts]
+    if shared is not None:
+        together = np.zeros((starts[-1], shared.shape[2]))
+        for (f, k), J in zip(parts, rows, strict=True):
+            u = fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]])[0]
+            together[starts[f] : starts[f + 1]] += J.T @ np.einsum("ni,nik->nk", u, shared)
+        middle += together @ together.T
     for a, (f, _) in enumerate(parts):
         for b, (g, _) in enumerate(parts[: a + 1]):
             block = (np.einsum("ij,ij->i", moved[a], moved[b])[:, None] * rows[a]).T @ rows[b]
@@ -101,18 +143,29 @@ def joint_covariance(fits: Sequence[Fit], loss: str) -> np.ndarray:
     return told @ outer @ middle @ outer @ told.T
 
 
-def _moved(fits: Sequence[Fit], parts: list[tuple[int, int]], loss: str) -> list[np.ndarray]:
+def _moved(
+    fits: Sequence[Fit],
+    parts: list[tuple[int, int]],
+    loss: str,
+    spreads: np.ndarray | None,
+    shared: np.ndarray | None,
+) -> list[np.ndarray]:
     """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
     turned = [fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
+    worse = np.ones(1)
+    if spreads is not None:
+        worse = np.sqrt(np.trace(spreads @ spreads, axis1=1, axis2=2) / 3)[:, None]
+        turned = [(_through(u, spreads), worse * w) for u, w in turned]
     if loss == "robust" or not any(w.any() for _, w in turned):
-        noises = np.concatenate(link_noise(fits, loss))
+        noises = np.concatenate(link_noise(fits, loss, spreads, shared))
         return [s * np.hstack([u, 0 * w]) for s, (u, w) in zip(noises, turned, strict=True)]
     errors = np.column_stack(
         [fits[f].group.chains[k].error(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
     )
     freedom = np.array([len(errors) - fits[f].minimum.rank / len(fits[f].group.chains) for f, _ in parts])
-    by_place, by_turn = (np.stack(each, axis=1) for each in zip(*turned, strict=True))
-    s, a, factors = pose_noise(errors, by_place, by_turn, np.maximum(freedom, 1.0))
+    sure = 1 / worse[..., None]
+    by_place, by_turn = (np.stack(each, axis=1) * sure for each in zip(*turned, strict=True))
+    s, a, factors = pose_noise(errors * sure[..., 0], by_place, by_turn, np.maximum(freedom, 1.0))
     return [c * np.hstack([s * u, a * w]) for c, (u, w) in zip(factors, turned, strict=True)]
 
 

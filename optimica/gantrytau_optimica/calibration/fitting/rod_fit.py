@@ -12,11 +12,14 @@ from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum
 from gantrytau_optimica.calibration.fitting.least_squares import Problem, Taped, minimise, problem
 from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.fitting.robust import robust_deviation, without_strays
 
 FAR = 0.5  # m, from the start values; fits that data do not hold may run off further
 NOISES, SETTLED = 10, 0.01  # rounds of estimating the noise with a tape measure, until it changes by less
 CLEARLY = 10.0  # times better than a tape measure, from which on its pull would be negligible
 ROUNDS = 60  # of reweighting
+MANY = 6000  # closure errors, which show the noise well enough
+STRAYS = 3.0  # times the robust deviation, from which on strays make the mean of the squares
 HUBER, TUKEY = 1.345, 4.685  # of the standard deviation, 95 % efficient for normal noise (Huber, 1981)
 
 
@@ -82,19 +85,23 @@ def fit_group(
             found = replace(found, noise=noise_of(minimum, group))
             minimum = minimise(found, x)
         noise = noise_of(minimum, group)
+        if minimum.singular.min(initial=np.inf) <= CLEARLY * noise / group.tape:
+            noise = _without_strays(group, minimum.x, weights, noise)
         near = np.abs(minimum.x - x).max(initial=0.0) < FAR
         if minimum.success and near and minimum.singular.min(initial=np.inf) > CLEARLY * noise / group.tape:
             return Fit(group, minimum, 0.0, weights)
     else:
         noise = smallest * group.tape
-    found, x, limit = _by_tape(found, noise, smallest)
+    found, x, limit = _by_tape(found, noise, smallest, weights)
     _, singular, directions = np.linalg.svd(found.slopes(x)[:, group.free], full_matrices=False)
     held = int((singular > max(limit, RELATIVE * singular.max(initial=0.0))).sum())
     minimum = minimise(found, x, directions=directions, movable=held)
     return Fit(group, minimum, limit, weights)
 
 
-def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Problem, np.ndarray, float]:
+def _by_tape(
+    found: Problem, noise: float, smallest: float | None, weights: np.ndarray | None
+) -> tuple[Problem, np.ndarray, float]:
     """The problem, its numbers where a TAPE holds all about the start values, and `smallest`; from a guess of the noise,
     which is found anew from what is left.
     """
@@ -107,9 +114,23 @@ def _by_tape(found: Problem, noise: float, smallest: float | None) -> tuple[Prob
         squares = np.linalg.svd(J, compute_uv=False) ** 2
         told = float(np.sum(squares / np.maximum(squares + limit**2, 1e-300)))  # how many numbers data tell
         before, noise = noise, float(np.sqrt(left @ left / max(1.0, _count(group) - told)))
+        noise = _without_strays(group, minimum.x, weights, noise)
         rounds += 1
         if smallest is not None or abs(noise - before) <= SETTLED * before or rounds == NOISES:
             return tape.problem, minimum.x, limit
+
+
+def _without_strays(group: Group, x: np.ndarray, weights: np.ndarray | None, noise: float) -> float:
+    """The noise of a closure error as a fit that strays do not lead would leave it, where these make the mean of the squares
+    far larger: what data hold does not depend on one wrong pose.
+    """
+    few = slice(None, None, max(1, _count(group) // MANY))
+    sure = np.ones(len(group.chains[0].q)) if weights is None else weights
+    rows = np.flatnonzero(sure > 0)[few]
+    left = (group.errors(x)[rows] * sure[rows, None]).T.ravel()
+    J = np.concatenate([group.slopes(x, k)[rows] * sure[rows, None] for k in range(len(group.chains))])
+    usual = robust_deviation(without_strays(left, J), int(np.linalg.matrix_rank(J)))
+    return usual if STRAYS * usual < noise else noise
 
 
 def not_held(fit: Fit) -> float:

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.order_effects import OrderEffect, order_effect
 from gantrytau_optimica.calibration.judging.pulls import pulls
 from gantrytau_optimica.calibration.judging.slips import Slip, slip, smooth_functions
 from gantrytau_optimica.calibration.judging.suspicion import OUTLIER
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 
 SHOWN = 3  # priors or constraints that are named
 UNIT = 1e-9  # by which a direction of length 1 may be rounded
@@ -21,6 +21,10 @@ ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
 def ordered(found: FittedRods) -> Iterator[Finding]:
     """What changed from one row on, with the order of the rows, or from row to row."""
+    if (
+        found.measurements.shared is not None
+    ):  # errors that poses have in common follow the order of their places
+        return
     used, systems = found.systems(LOOKED_AT)
     r, fitted = found.measurements.r[used], np.flatnonzero(np.isin(used, found.rows))
     smooth = smooth_functions(r[fitted])

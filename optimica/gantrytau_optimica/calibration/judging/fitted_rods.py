@@ -11,7 +11,6 @@ from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
@@ -32,6 +31,7 @@ from gantrytau_optimica.calibration.rods.arm_kinematics import ArmKinematics
 from gantrytau_optimica.calibration.rods.error_models import COMMON
 from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.fitting.finding import Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +66,14 @@ class FittedRods(Record):
             f"{len(self.rows)} poses, {self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
         )
 
+    def without_strays(self) -> Self:
+        """The same by the rows that close as others do, for what is judged beside wrong ones."""
+        bad = self.suspicion.rows
+        if not bad.size or self.loss == "robust":
+            return self
+        rows, held_out = (np.setdiff1d(each, bad) for each in (self.rows, self.held_out))
+        return replace(self, fits=self.suspicion.fits, rows=rows, held_out=held_out)
+
     def with_findings(self, findings: Sequence[Finding]) -> Self:
         """The same with other findings, without working anything out anew."""
         return self._kept(replace(self, findings=tuple(findings)), "findings")
@@ -95,6 +103,16 @@ class FittedRods(Record):
             return {}
         motion = self.motion or Motion(np.eye(3), np.zeros(3))
         return {"frame.R": motion.rotation, "frame.t": motion.translation}
+
+    @property
+    def robot_name(self) -> str:
+        """What the robot is called."""
+        return self.nominal_rods.name
+
+    @property
+    def nominal_values(self) -> Mapping[str, Any]:
+        """What parameters were before."""
+        return self.nominal_rods.values
 
     @property
     def arms(self) -> tuple[ArmClosure, ...]:
@@ -137,12 +155,19 @@ class FittedRods(Record):
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of one coordinate of a measured position that explains what is left, m."""
-        return float(np.sqrt(np.mean(np.concatenate(link_noise(self.fits, self.loss)) ** 2)))
+        """Standard deviation of one coordinate of a measured position that explains what is left, m; of one of median
+        covariance where measurements say how sure each is.
+        """
+        found = link_noise(self.fits, self.loss, self._fitted.spreads, self._fitted.shared)
+        return float(np.sqrt(np.mean(np.concatenate(found) ** 2)))
+
+    @property
+    def _fitted(self) -> Measurements:
+        return self.measurements.select(self.rows)
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        return joint_covariance(self.fits, self.loss)
+        return joint_covariance(self.fits, self.loss, self._fitted.spreads, self._fitted.shared)
 
     def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
         """Covariance (k, k) of parameters in their order; a vector's name stands for its three elements.
@@ -163,9 +188,10 @@ class FittedRods(Record):
             if wanted:
                 lost = [n for n in wanted if n in self.undetermined]
                 if lost:
+                    advice = "turn the plate more between" if self.plate_turns else "measure more"
                     raise ModelError(
-                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; turn the plate "
-                        "more between poses, or give a prior"
+                        f"covariance: data do not hold {', '.join(lost)}, which stayed near the start value; {advice} "
+                        "poses, or give a prior"
                     )
                 return [self.names.index(n) for n in wanted]
         if name in self._frame():
@@ -227,8 +253,10 @@ class FittedRods(Record):
 
     @property
     def error(self) -> np.float64:
-        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted."""
-        return _mean(self.errors[~np.isin(self.held_out, self.left_out)])
+        """Mean of `errors`, m, without `left_out`: the error to expect of a pose that was not fitted. Poses that were told
+        to be surer count by the squares of their certainty.
+        """
+        return self._mean(self.errors)
 
     @cached_property
     def angle_errors(self) -> np.ndarray:
@@ -242,7 +270,11 @@ class FittedRods(Record):
     @property
     def angle_error(self) -> np.float64:
         """Mean of `angle_errors`, rad, without `left_out`; NaN where no orientations were measured."""
-        return _mean(self.angle_errors[~np.isin(self.held_out, self.left_out)])
+        return self._mean(self.angle_errors)
+
+    def _mean(self, values: np.ndarray) -> np.float64:
+        good = ~np.isin(self.held_out, self.left_out)
+        return mean_by_worth(values[good], self._held_out.select(good).certainty)
 
     @property
     def plate_turns(self) -> bool:
@@ -250,11 +282,13 @@ class FittedRods(Record):
         return any(link.R is not None for fit in self.fits for link in fit.group.chains)
 
     def link_errors(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m."""
-        found = []
+        """Of each link its name, positions of its cart (N,) in m, and how far it is from its length (N,) in m, of surer
+        poses by as much more.
+        """
+        found, sure = [], self._fitted.certainty
         for fit in self.fits:
             for chain, e in zip(fit.group.chains, fit.distances().T, strict=True):
-                found.append((chain.name, chain.q, e))
+                found.append((chain.name, chain.q, e if sure is None else e * sure))
         return found
 
     @cached_property
@@ -271,7 +305,11 @@ class FittedRods(Record):
         return rows, link_systems(self.fits, self.measurements.select(rows))
 
 
-def _mean(values: np.ndarray) -> np.float64:
-    """The mean of what is finite, NaN of nothing."""
-    finite = values[np.isfinite(values)]
-    return np.float64(finite.mean()) if finite.size else np.float64(np.nan)
+def mean_by_worth(values: np.ndarray, certainty: np.ndarray | None) -> np.float64:
+    """The mean of what is finite, NaN of nothing, by the squares of the certainty of each where it is known."""
+    finite = np.isfinite(values)
+    if not finite.any():
+        return np.float64(np.nan)
+    if certainty is None:
+        return np.float64(values[finite].mean())
+    return np.float64(np.average(values[finite], weights=certainty[finite] ** 2))

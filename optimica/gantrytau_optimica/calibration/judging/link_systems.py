@@ -23,7 +23,7 @@ class LinkSystem(Record):
 
     errors: closure errors, (N, m) in m; numbers: their derivatives by the combinations of numbers that data hold and by
     those that were given, (N, m, p); place, turn: by T and by a rotation vector of the plate in the world, (N, m, 3);
-    actuators: by columns of q, (N, m).
+    actuators: by columns of q, (N, m); certainty: (N, 1), by which the rows of all of these are multiplied.
     """
 
     errors: np.ndarray
@@ -31,6 +31,7 @@ class LinkSystem(Record):
     place: np.ndarray
     turn: np.ndarray
     actuators: Mapping[int, np.ndarray]
+    certainty: np.ndarray
 
     @cached_property
     def known(self) -> np.ndarray:
@@ -48,18 +49,22 @@ class LinkSystem(Record):
         return (flat - self.known @ (self.known.T @ flat)).reshape(columns.shape)
 
     def beside(self, columns: np.ndarray) -> "LinkSystem":
-        """The same where further columns (N, m, k) explain errors as numbers do."""
+        """The same where further columns (N, m, k), without certainty, explain errors as numbers do."""
+        columns = columns * self.certainty[..., None]
         return replace(self, numbers=np.concatenate([self.numbers, columns], axis=2))
 
     def of(self, rows: np.ndarray) -> "LinkSystem":
         """The same at some of the poses."""
         actuators = {column: slopes[rows] for column, slopes in self.actuators.items()}
-        return LinkSystem(self.errors[rows], self.numbers[rows], self.place[rows], self.turn[rows], actuators)
+        errors, numbers, place, turn = (
+            array[rows] for array in (self.errors, self.numbers, self.place, self.turn)
+        )
+        return LinkSystem(errors, numbers, place, turn, actuators, self.certainty[rows])
 
 
 def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
     """The links of each fit at the poses of data, whether they were fitted or not."""
-    found = []
+    found, sure = [], np.ones((len(data), 1)) if data.certainty is None else data.certainty[:, None]
     for fit in fits:
         here = fit.group.over(data.q, data.r, data.R)
         every = replace(here, free=np.ones_like(here.free))
@@ -74,12 +79,12 @@ def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
         # errors of links on straight guideways are squares of lengths: in m where T moves them by as much as itself
         unit = np.median(np.linalg.norm(place, axis=2), axis=0)
         actuators = {
-            column: np.column_stack([one.get(column, np.zeros(len(data))) for one in slopes]) / unit
+            column: sure * np.column_stack([one.get(column, np.zeros(len(data))) for one in slopes]) / unit
             for column in sorted({column for one in slopes for column in one})
         }
-        errors = here.errors(fit.x) / unit
-        numbers, place, turn = (array / unit[:, None] for array in (numbers, place, turn))
-        found.append(LinkSystem(errors, numbers, place, turn, actuators))
+        errors = sure * here.errors(fit.x) / unit
+        numbers, place, turn = (sure[..., None] * array / unit[:, None] for array in (numbers, place, turn))
+        found.append(LinkSystem(errors, numbers, place, turn, actuators, sure))
     return found
 
 

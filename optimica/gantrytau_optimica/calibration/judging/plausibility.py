@@ -11,7 +11,7 @@ from itertools import permutations
 import numpy as np
 
 from gantrytau.kinematics.rotations import mean_rotation, motion
-from gantrytau_optimica.calibration.data.findings import CalibrationError, rows_in_words
+from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import thinned
 from gantrytau_optimica.calibration.data.mistakes import Mistake, mistakes
 from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
@@ -20,6 +20,7 @@ from gantrytau_optimica.calibration.rods.closure import Chain
 from gantrytau_optimica.calibration.rods.error_models import ModelLink, moved
 from gantrytau_optimica.calibration.rods.linear_start import linear_start
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.fitting.finding import rows_in_words
 
 ROUGH = 1e-3  # m, of links by their linear equations, above which their closure is solved
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better

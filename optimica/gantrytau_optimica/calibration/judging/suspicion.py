@@ -20,10 +20,9 @@ from gantrytau_optimica.calibration.judging.link_systems import freedom, link_sy
 from gantrytau_optimica.calibration.judging.masked_rows import AGREEING, masked_rows
 from gantrytau_optimica.calibration.judging.plausibility import BETTER, NEAR, Misses
 from gantrytau_optimica.calibration.rods.forward import BLOCK, RodLink
+from gantrytau_optimica.fitting.robust import OUTLIER, limit
 
 CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
-OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
-CHANCE = 1e-6  # that noise of few poses exceeds the limit
 MANY = 2000  # poses, from which on h is negligible
 LOOKED_AT = 100  # poses fitted, and as many held out, among which masked ones are looked for
 LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
@@ -32,19 +31,13 @@ LEAST = 0.05  # of 1 - h, of poses that the fit follows whatever they say
 @dataclass(frozen=True)
 class Suspicion(Record):
     """rows: those that close too badly; misses: how links identified without them close; typical: robust standard
-    deviation of the closure errors of the others, of the worst link, m.
+    deviation of the closure errors of the others, of the worst link, m; fits: without them, by weights 0.
     """
 
     rows: np.ndarray
     misses: Misses
     typical: float
-
-
-def limit(freedom: float) -> float:
-    """How many robust standard deviations noise does not reach, where `freedom` errors showed it."""
-    from scipy.special import stdtrit
-
-    return max(OUTLIER, float(stdtrit(max(1.0, freedom), 1.0 - CHANCE)))
+    fits: tuple[Fit, ...] = ()
 
 
 def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.ndarray, float]:
@@ -70,16 +63,18 @@ def suspicion(
     mask[fitted] = mask[held_out] = True
     used = np.flatnonzero(mask)
     fits, bad = list(fits), used[:0]
+    sure = measurements.select(fitted).certainty
+    sure = 1.0 if sure is None else sure
     sizes, typical = relative_distances(fits, measurements, used, fitted)
     # among many poses a mistake in a few is seen without nominal values
     if (len(used) < MANY or (sizes > OUTLIER).any()) and (
         coarse := far_rows(nominal, measurements, used)
     ).size:
-        fits = [fit_group(fit.group, 1.0 - np.isin(fitted, coarse)) for fit in fits]
+        fits = [fit_group(fit.group, sure * (1.0 - np.isin(fitted, coarse))) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     degrees = min((fit.count - fit.minimum.rank) / len(fit.group.chains) for fit in fits)
     if (agreeing := agreeing_rows(fits, measurements, fitted, held_out)) is not None:
-        fits = [fit_group(fit.group, np.isin(fitted, agreeing).astype(float)) for fit in fits]
+        fits = [fit_group(fit.group, sure * np.isin(fitted, agreeing)) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     for _ in range(CLEANINGS):
         fresh = used[sizes > limit(degrees)]
@@ -89,14 +84,14 @@ def suspicion(
         weights = 1.0 - np.isin(fitted, bad)
         if weights.sum() < AGREEING * len(weights):
             break
-        fits = [fit_group(fit.group, weights, begin=fit.x) for fit in fits]
+        fits = [fit_group(fit.group, sure * weights, begin=fit.x) for fit in fits]
         sizes, typical = relative_distances(fits, measurements, used, fitted)
     distances = _distances_of(fits)
 
     def misses(q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
         return np.abs(distances(q, r, R)).max(axis=0)
 
-    return Suspicion(bad, misses, typical)
+    return Suspicion(bad, misses, typical, tuple(fits))
 
 
 def agreeing_rows(
@@ -142,8 +137,9 @@ def relative_distances(
     for first in range(0, len(rows), BLOCK):
         part = slice(first, first + BLOCK)
         parts.append(distances(whole.q[part], whole.r[part], None if whole.R is None else whole.R[part]))
+    sure = 1.0 if whole.certainty is None else whole.certainty
     spread = _spread(fits, whole, np.isin(rows, fitted)) if len(rows) < MANY else 1.0
-    return standardised(np.concatenate(parts, axis=1), spread)
+    return standardised(sure * np.concatenate(parts, axis=1), spread)
 
 
 def _distances_of(
@@ -169,7 +165,7 @@ def _distances(links: Sequence[RodLink], q: np.ndarray, r: np.ndarray, R: np.nda
 
 def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.ndarray:
     """sqrt(1 -+ h) of the links, in their order, (links, N)."""
-    found = []
+    found, sure = [], None if data.certainty is None else data.certainty[:, None]
     for fit in fits:
         minimum, scale = fit.minimum, fit.group.scale[fit.group.free]
         here = fit.group if fitted.all() else fit.group.over(data.q, data.r, data.R)
@@ -180,6 +176,7 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
         lost = minimum.directions[minimum.rank :] / not_held(fit) * scale if minimum.cost > 0 else held[:0]
         for k, link in enumerate(here.chains):
             J = here.slopes(fit.x, k)
+            J = J if sure is None else J * sure
             own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
             h = own.sum(axis=1)
             spread = np.where(used, np.maximum(1.0 - h, LEAST), 1.0 + h + other.sum(axis=1))

@@ -53,19 +53,29 @@ def tool_error(
     angle: float = 0.0,
     tape: float,
     orientation: Orientation = "local",
+    certainty: np.ndarray | None = None,
 ) -> ToolError:
     """What a fit to some poses knows of the tool at others.
 
     fitted, at: poses of the robot itself, which close its links, without R where the plate cannot turn; noise, angle:
-    deviations of a measured pose per axis, m and rad; tape: of nominal values, m at the joints.
+    deviations of a measured pose per axis, m and rad; tape: of nominal values, m at the joints; certainty: of the fitted
+    poses, (N,), by which deviations are divided.
     """
     noise = max(noise, 1e-9)
     expected = predict(
-        robot, fitted, at=at, noise=noise, angle=angle, tape=tape, orientation=orientation
+        robot,
+        fitted,
+        at=at,
+        noise=noise,
+        angle=angle,
+        tape=tape,
+        orientation=orientation,
+        certainty=certainty,
     ).position
     arms, found = read_arms(robot, orientation), []
     for arm, (gain, _) in zip(arms, tool_gain(arms, *at), strict=True):
         J = arm.closure(*fitted)[1] * scales(arm)
+        J = J if certainty is None else J * certainty[:, None, None]
         _, s, V = np.linalg.svd(np.linalg.qr(J.reshape(-1, arm.count), mode="r"))
         known = np.zeros(arm.count)
         known[: len(s)] = s

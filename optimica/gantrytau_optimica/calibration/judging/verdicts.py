@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, agreeing, rows_in_words
+from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.causes import ordered, pulled, scaled
@@ -23,6 +23,7 @@ from gantrytau_optimica.calibration.judging.suspicion import OUTLIER, Suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.rods.error_models import ModelLink, links_of_arms, moved
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
@@ -192,14 +193,16 @@ def judged(found: FittedRods) -> list[Finding]:
             f"deviations; {advice}"
         )
         findings.append(Finding("outliers", others, words))
-    findings += ordered(found)
+    others = found.without_strays()
+    findings += ordered(others)
     return [
         *findings,
         *_misfit(found, seen, findings),
         *pulled(found),
         *scaled(found),
-        *_far(found),
+        *_far(others),
         *_in_doubt(found),
+        *_undetermined(others),
         *_shared(found),
     ]
 
@@ -209,7 +212,7 @@ def _shared(found: FittedRods) -> Iterator[Finding]:
     data = found.measurements.select(found.rows)
     if data.covariance is None:
         return
-    foretold = float(np.sqrt(np.mean(np.trace(data.covariance, axis1=1, axis2=2))))
+    foretold = float(np.sqrt(np.nanmedian(np.trace(data.covariance, axis1=1, axis2=2))))
     left = np.sqrt(3) * found.noise
     if foretold > SHARED * left:
         words = (
@@ -270,6 +273,9 @@ def _in_doubt(found: FittedRods) -> Iterator[Finding]:
             "prior={name: deviation}"
         )
         yield Finding("not converged", found.rows, words)
+
+
+def _undetermined(found: FittedRods) -> Iterator[Finding]:
     if found.undetermined:
         advice = (
             "turn the plate more" if found.plate_turns else "measure more poses, spread over the workspace"

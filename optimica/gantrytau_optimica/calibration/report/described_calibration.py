@@ -21,9 +21,7 @@ def calibration_described(found: Any, name: str = "") -> Description:
         found.parameters[name]  # an unknown name raises
         _, *told = _row(found, name, deviations)
         facts = tuple(zip(COLUMNS[1:], told, strict=True))
-        return Description(
-            name, f"parameter of {found.nominal_rods.name}", "", tuple(f for f in facts if f[1])
-        )
+        return Description(name, f"parameter of {found.robot_name}", "", tuple(f for f in facts if f[1]))
     facts = [
         ("fitted", f"{len(found.rows)} poses, {len(found.names)} numbers of rank {found.rank}"),
         (
@@ -35,7 +33,7 @@ def calibration_described(found: Any, name: str = "") -> Description:
     facts += [("not held by the data", cut(", ".join(found.undetermined), LONG))] * bool(found.undetermined)
     facts += [("finding", str(one)) for one in found.findings]
     rows = [_row(found, n, deviations) for n in found.parameters]
-    title = f"Calibration of {found.nominal_rods.name}"
+    title = f"Calibration of {found.robot_name}"
     return Description(title, "", "", tuple(facts), (Listing.of("Parameters", COLUMNS, rows),))
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
 from gantrytau_optimica.calibration.report.report_page import html_report
 
@@ -55,7 +54,7 @@ class About(Record):
     validation: np.ndarray | None = None
 
 
-def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, Any]:
+def report_numbers(found: Any, about: About | None = None) -> dict[str, Any]:
     """Everything that the report says, as plain numbers and lists; lengths in m, angles in rad."""
     about = about or About()
     errors, vectors = found.errors, found.error_vectors
@@ -64,7 +63,7 @@ def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, A
     counts, edges = np.histogram(errors[good], bins=BINS)
     return {
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "robot": about.robot or found.nominal_rods.name,
+        "robot": about.robot or found.robot_name,
         "facts": dict(about.facts),
         "verdict": {"good": about.good, "words": about.verdict},
         "model": found.model,
@@ -95,7 +94,7 @@ def report_numbers(found: FittedRods, about: About | None = None) -> dict[str, A
     }
 
 
-def fits_all(found: FittedRods) -> bool:
+def fits_all(found: Any) -> bool:
     """Whether errors are those of the fitted poses, as none were held out."""
     return np.array_equal(found.held_out, found.rows)
 
@@ -110,7 +109,7 @@ def _transformation(motion: Motion | None) -> dict[str, Any] | None:
     }
 
 
-def _validation(found: FittedRods, about: About) -> dict[str, float | None] | None:
+def _validation(found: Any, about: About) -> dict[str, float | None] | None:
     """Of poses that were left out of fits in turn, or of those held out; None where all errors are those of the fit."""
     if about.validation is not None:
         errors = np.delete(about.validation, found.left_out)
@@ -121,10 +120,10 @@ def _validation(found: FittedRods, about: About) -> dict[str, float | None] | No
     return _spread(found.errors[good])
 
 
-def nominal_values(found: FittedRods) -> dict[str, float]:
+def nominal_values(found: Any) -> dict[str, float]:
     """The numbers by name that the robot had before, of those that were looked for."""
-    values = found.nominal_rods.values
-    return scalars({name: values[name] for name in found.parameters if name in values})
+    values = found.nominal_values
+    return scalars({name: values[name] for name in (*found.parameters, *found.names) if name in values})
 
 
 def scalars(values: Mapping[str, Any]) -> dict[str, float]:
@@ -136,7 +135,7 @@ def scalars(values: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def _poses(found: FittedRods, about: About) -> list[dict[str, Any]]:
+def _poses(found: Any, about: About) -> list[dict[str, Any]]:
     """The error of each pose, in the order of rows; of very many poses the worst."""
     sizes, angles = found.errors, found.angle_errors
     places = np.arange(len(sizes))
@@ -187,7 +186,7 @@ def _spread(values: np.ndarray) -> dict[str, float | None]:
     }
 
 
-def write_report(found: FittedRods, path: Path, about: About | None = None) -> Path:
+def write_report(found: Any, path: Path, about: About | None = None) -> Path:
     """Both files, whole or not at all; the path of the page, which ends in .html.
 
     Raises ModelError for names that end in that of another format, and for what cannot be written.

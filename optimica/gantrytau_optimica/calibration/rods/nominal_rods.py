@@ -67,7 +67,8 @@ def read_nominal(robot: Any) -> NominalRods:
     if rods is None or not rods.arms:
         raise ModelError(
             f"calibrate: found {type(robot).__name__} that does not say what its rods are, expected a robot such as "
-            "GantryTau(prototypes.L1); give the model a method rods() that returns Rods([RodArm(...), ...])"
+            "GantryTau(prototypes.L1); name what is to be found, parameters=['upper.r'], of any other robot, or give the "
+            "model a method rods() that returns Rods([RodArm(...), ...])"
         )
     values = _written(robot, rods.parameters) or _declared(robot, rods) or _flattened(robot, rods)
     return NominalRods(robot, rods, values)
@@ -130,6 +131,11 @@ def _flattened(robot: Model, rods: Rods) -> dict[str, np.ndarray]:
 
 def with_numbers(robot: Model, values: Mapping[str, Any]) -> Model:
     """The robot with other numbers for parameters by name, such as `arms[0].links[1].length`."""
+    return robot.modified(modifications_of(robot, values))
+
+
+def modifications_of(robot: Model, values: Mapping[str, Any]) -> Any:
+    """Numbers by name as nested modifications of the robot."""
     tree: dict[Any, Any] = {}
     for name, value in values.items():
         *way, last = [key or int(index) for key, index in _PARTS.findall(name)]
@@ -137,7 +143,7 @@ def with_numbers(robot: Model, values: Mapping[str, Any]) -> Model:
         for part in way:
             branch = branch.setdefault(part, {})
         branch[last] = float(value) if np.ndim(value) == 0 else [float(x) for x in value]
-    return robot.modified(_as_modifications(tree, robot.modifications))
+    return _as_modifications(tree, robot.modifications)
 
 
 def _as_modifications(tree: Any, old: Any) -> Any:

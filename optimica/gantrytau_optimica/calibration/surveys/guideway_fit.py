@@ -7,7 +7,8 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
-from gantrytau_optimica.calibration.data.findings import CalibrationError, Finding, rows_in_words
+from gantrytau_optimica.calibration.data.findings import CalibrationError
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 
 Array = np.ndarray
 DEGREE = 3  # of the splines of the smooth part

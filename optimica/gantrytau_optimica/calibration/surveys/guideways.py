@@ -17,7 +17,6 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.surveys.guideway_fit import (
     HIDDEN,
     Basis,
@@ -32,6 +31,7 @@ from gantrytau_optimica.calibration.surveys.guideway_fit import (
     refuse_hidden,
     scale_findings,
 )
+from gantrytau_optimica.fitting.finding import Finding
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from gantrytau import GantryTauError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.judging.tool_error import Loose, ToolError, tool_error
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.calibration.rods.groups import TAPE
 from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, held_out
+from gantrytau_optimica.fitting.finding import Finding
 
 SHOWN = 3  # combinations that are named
 NOTHING_MEASURED = 1e3  # m, noise with which poses tell nothing
@@ -40,7 +41,7 @@ class CalibrationVerdict(Record, Verdict):
 
 
 def judge(
-    found: Calibration | CrossValidation,
+    found: Calibration | NamedCalibration | CrossValidation,
     wanted: float,
     *,
     expected: ToolError | None = None,
@@ -55,8 +56,10 @@ def judge(
     the error of the tool where it is to work, by default at the poses that were fitted; tape: standard deviation of
     nominal values, m. Raises ModelError for models that no robot can hold, where `expected` is not given.
     """
-    checked = held_out(found) if isinstance(found, Calibration) else found
+    checked = found if isinstance(found, CrossValidation) else held_out(found)
     fit = checked.calibration
+    if isinstance(fit, NamedCalibration):
+        return _of_names(checked, fit, wanted)
     where = "the fitted poses" if expected is None else "all planned poses"
     expected = expected or expected_error(fit, tape=tape)
     good = bool(fit.success and checked.error <= wanted and expected.error <= wanted)
@@ -69,6 +72,24 @@ def judge(
     return CalibrationVerdict(
         good, wanted, (f"{words}.", _of_frame(fit, good, tape)), checked.error, expected.error
     )
+
+
+def _of_names(checked: CrossValidation, fit: NamedCalibration, wanted: float) -> CalibrationVerdict:
+    """Whether named parameters are good enough, at the poses that were fitted."""
+    expected = float(fit.expected.mean())
+    good = bool(fit.success and checked.error <= wanted and expected <= wanted)
+    words = (
+        f"{_validated(checked)}, {um(expected)} of the tool are expected at the fitted poses by what was measured, "
+        f"{um(wanted)} were wanted{'' if good else '; look at the findings, name more parameters, or measure more poses'}."
+    )
+    base = (
+        "Poses were measured in the base of the robot."
+        if fit.frame == "base"
+        else (
+            "Coordinates of the base follow by frame.R and frame.t, which were fitted beside the parameters."
+        )
+    )
+    return CalibrationVerdict(good, wanted, (words, base), checked.error, expected)
 
 
 def _of_frame(found: Calibration, good: bool, tape: float) -> str:
@@ -96,9 +117,8 @@ def expected_error(found: Calibration, *, tape: float = TAPE, noise: float | Non
     """
     data = found.measurements.select(found.rows)
     poses = PoseArrays(data.q, data.r, data.R if found.plate_turns else None)
-    return tool_error(
-        found.robot, poses, poses, noise=float(found.noise if noise is None else noise), tape=tape
-    )
+    noise = float(found.noise if noise is None else noise)
+    return tool_error(found.robot, poses, poses, noise=noise, tape=tape, certainty=data.certainty)
 
 
 def _validated(checked: CrossValidation) -> str:
@@ -127,6 +147,8 @@ def told_by_tool(
     expected: by default at the poses that were fitted; least: m, by which the tool must move to be worth a word, by default
     the noise; tape: deviation of nominal values, m.
     """
+    if isinstance(found, NamedCalibration):  # its words are those of the numbers already
+        return found
     if expected is None:
         try:
             expected = expected_error(found, tape=tape) if found.undetermined else None

@@ -11,36 +11,43 @@ from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.judging.fitted_rods import mean_by_worth
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 
 
 @dataclass(frozen=True, eq=False)
 class CrossValidation(Record):
     """A calibration, and how far poses lie from where fits without them expect them.
 
-    calibration: with all that was fitted; errors: distances by row of the measurements, (N,) in m, NaN where a row was
+    calibration: with all that was fitted, as of `calibrate`.
+    errors: distances by row of the measurements, (N,) in m, NaN where a row was
     always fitted or not usable.
     """
 
-    calibration: Calibration
+    calibration: Any
     errors: np.ndarray
 
     @property
     def good(self) -> np.ndarray:
         """The errors without gross ones, which a robust loss leaves without weight, (n,) in m."""
-        errors = np.delete(self.errors, self.calibration.left_out)
-        return errors[np.isfinite(errors)]
+        return self.errors[self._kept]
+
+    @property
+    def _kept(self) -> np.ndarray:
+        rows = np.delete(np.arange(len(self.errors)), self.calibration.left_out)
+        return rows[np.isfinite(self.errors[rows])]
 
     @property
     def error(self) -> float:
-        """Their mean, m; NaN where no pose was left out of a fit."""
-        return float(self.good.mean()) if self.good.size else float("nan")
+        """Their mean, m, of surer poses by as much more; NaN where no pose was left out of a fit."""
+        return float(mean_by_worth(self.good, self.calibration.measurements.select(self._kept).certainty))
 
     def __repr__(self) -> str:
         count = f"{self.good.size} poses that were not fitted"
         return f"<CrossValidation: {self.error * 1e6:.3g} um in the mean of {count}>"
 
 
-def held_out(calibration: Calibration) -> CrossValidation:
+def held_out(calibration: Calibration | NamedCalibration) -> CrossValidation:
     """By the poses that `calibrate` held out; all NaN if it fitted all of them."""
     errors = np.full(len(calibration.measurements), np.nan)
     if not np.array_equal(calibration.held_out, calibration.rows):

@@ -7,7 +7,9 @@ from typing import Any
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.calibration.report.report import nominal_values, scalars
+from gantrytau_optimica.calibration.rods.nominal_rods import modifications_of
 
 GEOMETRY = ("length", "offset", "direction", "plate_offset", "orientation", "start", "r")
 HOLDERS = ("arms", "links", "turntables", "tool")
@@ -26,7 +28,7 @@ class ParameterRow(Record):
     change: float | None
 
 
-def parameter_rows(found: Calibration) -> list[ParameterRow]:
+def parameter_rows(found: Calibration | NamedCalibration) -> list[ParameterRow]:
     """Each number with its deviation, and how far it is from the nominal one."""
     nominal, deviations, values = nominal_values(found), found.deviations, scalars(found.parameters)
     rows = []
@@ -44,8 +46,10 @@ def _common(name: str, deviations: Mapping[str, float]) -> str:
     return name[name.index("direction") :] if shared else name
 
 
-def calibrated_geometry(found: Calibration) -> dict[str, Any] | None:
+def calibrated_geometry(found: Calibration | NamedCalibration) -> dict[str, Any] | None:
     """The calibrated geometry as modifications, `robot.modified(...)`; None of models that no robot can hold."""
+    if isinstance(found, NamedCalibration):
+        return modifications_of(found.given, dict(found.parameters))
     try:
         robot = found.robot
     except ModelError:

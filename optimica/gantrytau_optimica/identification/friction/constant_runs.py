@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
 from gantrytau_optimica.identification.friction.figures import draw_friction

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
 from gantrytau_optimica.identification.friction.friction_fit import ActuatorRows, FrictionFit
 

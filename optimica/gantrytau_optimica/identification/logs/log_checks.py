@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 from gantrytau_optimica.identification.logs.plain_friction import PlainFits, plain_fits
 
 GAP = 1.5  # median periods: what is longer lacks a sample

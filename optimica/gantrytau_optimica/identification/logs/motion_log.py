@@ -12,8 +12,8 @@ from gantrytau import Model, ModelError, Result, translate
 from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
 

@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau import Model, ModelError, translate
 from gantrytau.dae import Dae
 from gantrytau.kinematics.kinematics import Kinematics, driven_joints
-from gantrytau_optimica.calibration.data.findings import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 from gantrytau_optimica.identification.logs.log_checks import WINDOW, slopes
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
 

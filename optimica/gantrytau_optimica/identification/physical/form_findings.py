@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
 
 APART = 0.2  # of M and of K by norm, by which two routes may differ

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.physical.form_findings import form_findings
 from gantrytau_optimica.identification.physical.known_motion import KnownMotion, KnownResponse
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance

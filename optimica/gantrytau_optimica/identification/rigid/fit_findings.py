@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau.dae import Dae
 from gantrytau.kinematics.kinematics import driven_joints
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau import Model, translate
 from gantrytau.dae import Dae
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, agreeing
+from gantrytau_optimica.fitting.finding import Finding, agreeing
 from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRows, fit_servo
 
 NOISY = 20.0  # deviations of noise that a step should have

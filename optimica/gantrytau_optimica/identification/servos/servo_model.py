@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.servos.figures import draw_steps
 from gantrytau_optimica.identification.servos.servo_fit import corner, response
 from gantrytau_optimica.identification.servos.step_response import StepResponse

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 
 EVEN = 0.01  # of the period, by which times of samples may be off
 LEAST = 8  # samples from the first change of a reference on, which two parameters and a delay need

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 
 
 def sampled_motion(

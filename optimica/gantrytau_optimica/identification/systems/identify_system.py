@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from gantrytau import ModelError, StateSpace
 from gantrytau.answers.linear_systems.linear_system import check_period
 from gantrytau.results.figures import check_suffix, finished
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 from gantrytau_optimica.identification.systems.linear_fit import followed, input_matrices

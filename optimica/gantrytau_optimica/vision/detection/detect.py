@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.boards import Pattern
 from gantrytau_optimica.vision.detection.charuco import find_charuco
 from gantrytau_optimica.vision.detection.detections import LOST, Detections

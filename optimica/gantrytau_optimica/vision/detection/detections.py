@@ -11,7 +11,7 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.boards import Pattern
 from gantrytau_optimica.vision.opencv import VisionError
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.detection.quincunx import quarter_turned
 
 Array = np.ndarray

@@ -85,10 +85,13 @@ def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, BlockRows, in
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """Places of the pattern (N, 3), their covariances (N, 3, 3), a scale, and deviations of the lenses (C, 5)."""
+    """Places of the pattern (N, 3), their covariances (N, 3, 3) with what they share of it, (N, 3, S), a scale, and
+    deviations of the lenses (C, 5).
+    """
 
     r: Array
     covariance: Array
+    shared: Array
     scale: float
     lens_deviations: Array
 
@@ -104,7 +107,7 @@ def places(bundle: Bundle, state: State, rows: BlockRows, lengths: Spacing | Non
             lenses[c] = np.sqrt(np.maximum(np.diag(shared)[where], 0.0))
     own, coupling = equations.own[:, :3, :3], -equations.coupling[:, :3]
     if bundle.told.plate:
-        return state, Located(state.r, free_covariance(state.r, own, coupling, shared), state.size, lenses)
+        return state, Located(state.r, *free_covariance(state.r, own, coupling, shared), state.size, lenses)
     seen = bundle.seen.max(axis=0)  # corners that nothing is known of stand where the others have them
     r, R = plates(np.where(seen[..., None] > 0, state.corners, np.nan), bundle.points)
     filled = r[:, None] + bundle.points @ R.transpose(0, 2, 1)
@@ -122,10 +125,10 @@ def places(bundle: Bundle, state: State, rows: BlockRows, lengths: Spacing | Non
     coupling = np.concatenate([coupling, away[:, :, None]], axis=2)
     both = np.zeros((len(shared) + 1,) * 2)
     both[:-1, :-1], both[-1, -1] = shared, spread
-    covariance = scale**2 * free_covariance(r, own, coupling, both)
+    covariance, factor = free_covariance(r, own, coupling, both)
     cameras = tuple(replace(camera, r=scale * camera.r) for camera in state.cameras)
     state = replace(state, cameras=cameras, r=scale * r, R=R, corners=scale * state.corners)
-    return state, Located(scale * r, covariance, _size(state, bundle), lenses)
+    return state, Located(scale * r, scale**2 * covariance, scale * factor, _size(state, bundle), lenses)
 
 
 def _size(state: State, bundle: Bundle) -> float:

@@ -53,6 +53,10 @@ class State:
     middles: Array
     offsets: Array
 
+    def of(self, poses: Array) -> "State":
+        """The state of some of the poses."""
+        return replace(self, r=self.r[poses], R=self.R[poses], corners=self.corners[poses])
+
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
@@ -88,6 +92,10 @@ class Bundle:
         """1 where a corner was found, else 0, (C, N, P); of corners for themselves where two cameras found it."""
         found = np.isfinite(self.pixels[..., 0])
         return (found if self.told.plate else found & (found.sum(axis=0) > 1)).astype(float)
+
+    def of(self, poses: Array) -> "Bundle":
+        """The images of some of the poses."""
+        return replace(self, pixels=self.pixels[:, poses], weights=self.weights[:, poses])
 
     def residuals(self, state: State) -> Array:
         """Images less detections, (C, N, P, 2) in pixels, NaN where there are none."""

@@ -12,8 +12,9 @@ from gantrytau.kinematics.rotations import skewed
 Array = np.ndarray
 
 
-def free_covariance(r: Array, own: Array, coupling: Array, shared: Array) -> Array:
-    """Covariances (N, 3, 3) of places r (N, 3), in m2, after the best motion of all.
+def free_covariance(r: Array, own: Array, coupling: Array, shared: Array) -> tuple[Array, Array]:
+    """Covariances (N, 3, 3) of places r (N, 3), in m2, after the best motion of all, and what of it they share: factors F
+    (N, 3, S), F_i F_j' the covariance of two of them.
 
     Before it they are own_k + coupling_k shared coupling_k'.
 
@@ -28,4 +29,6 @@ def free_covariance(r: Array, own: Array, coupling: Array, shared: Array) -> Arr
     corrected = weighted @ turned
     found = own - corrected - corrected.transpose(0, 2, 1) + Q @ middle @ turned
     free = coupling - Q @ np.sum(turned @ coupling, axis=0)
-    return found + free @ shared @ free.transpose(0, 2, 1)
+    values, axes = np.linalg.eigh(shared)
+    factor = free @ (axes * np.sqrt(np.maximum(values, 0.0)))
+    return found + factor @ factor.transpose(0, 2, 1), factor

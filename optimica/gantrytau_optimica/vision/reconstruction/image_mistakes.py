@@ -7,7 +7,7 @@ import numpy as np
 
 from gantrytau import GantryTauError
 from gantrytau.kinematics.rotations import angle_between
-from gantrytau_optimica.calibration.data.findings import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.adjustment import adjusted, started
 from gantrytau_optimica.vision.reconstruction.bundle import PRIOR, Bundle, State
@@ -19,6 +19,9 @@ ANOTHER_SIZE = 1.25  # times the side of the pattern, beyond which spacing and s
 SIZE_TOLD = (
     0.01  # of the side of the pattern, by which spacing says it is another, from which on that is told
 )
+CONTRADICTED = (
+    0.05  # of the side, by which spacing says it is another, from which on spacing is believed alone
+)
 LARGE = 0.3  # pixel, of what is left of image points, above which reasons are looked for
 REFUSED, NOISY = 1.0, 3.0  # pixel, and deviations of a corner, above which images do not belong together
 CLEARLY = 0.93  # of what is left, below which what is held is better let go: noise gains 2 % by it
@@ -28,8 +31,10 @@ LEARNT = 0.35  # of the deviation that is assumed of what was given, above which
 NUMBERS = ("the focal length", "the centre across", "the centre down", "k1")
 
 
-def check_spacing(spacing: Spacing, r: Array, rows: Array) -> None:
-    """VisionError where places (N, 3) in m, by the side of the pattern, do not move as spacing says. rows: of all poses."""
+def check_spacing(spacing: Spacing, r: Array, rows: Array) -> float:
+    """How large the pattern is by spacing, as a multiple of its side; VisionError where places (N, 3) in m, by that side, do
+    not move as spacing says. rows: of all poses.
+    """
     missed = _missed(spacing, r)
     if missed > OFF:
         trials = {
@@ -50,6 +55,7 @@ def check_spacing(spacing: Spacing, r: Array, rows: Array) -> None:
             f"reconstruct: by spacing the pattern is {size:.4g} times as large as its side says, expected about 1; "
             "spacing and side are in m: divide mm by 1000"
         )
+    return size
 
 
 def check_left(bundle: Bundle, state: State, sigma: float) -> None:
@@ -73,6 +79,10 @@ def suspected(
 ) -> list[Finding]:
     """Findings on a reconstruction, rows from 0 of all poses. size: of the pattern as a multiple of its side."""
     found = []
+    if abs(size - 1) > SIZE_TOLD:
+        words = f"by spacing the pattern is {100 * (size - 1):+.2g} % larger than its side says; measure both"
+        more = "; lengths are those of spacing" if abs(size - 1) > CONTRADICTED else ""
+        found.append(Finding("size", rows, words + more))
     left = left_over(bundle, state)
     for words, other in _freed(bundle, state):
         if other < CLEARLY * left:
@@ -92,14 +102,6 @@ def suspected(
             found.append(
                 Finding("lens", rows, f"{words}; take poses all over the image, or intrinsics='fixed'")
             )
-    if abs(size - 1) > SIZE_TOLD:
-        found.append(
-            Finding(
-                "size",
-                rows,
-                f"by spacing the pattern is {100 * (size - 1):+.2g} % larger than its side says; measure both",
-            )
-        )
     return found
 
 

@@ -13,6 +13,7 @@ from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.adjustment import Located, adjusted, places, scaled_by, started
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
 from gantrytau_optimica.vision.reconstruction.image_mistakes import (
+    CONTRADICTED,
     LARGE,
     check_left,
     check_spacing,
@@ -21,12 +22,19 @@ from gantrytau_optimica.vision.reconstruction.image_mistakes import (
 )
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
+    check_facing,
     check_images,
     check_words,
     usable_poses,
 )
 from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
+from gantrytau_optimica.vision.reconstruction.stray_images import (
+    in_words,
+    left_by_poses,
+    other_moments,
+    stray_images,
+)
 
 Array = np.ndarray
 
@@ -58,25 +66,48 @@ def reconstruct(
     lenses = check_images(detections, cameras)
     tells = check_words(intrinsics, scale, spacing, orientation, corners, len(lenses))
     rows = usable_poses(detections)
-    distances = None if tells == "pattern" else spacing_of(spacing, len(detections.numbers)).select(rows)
+    check_facing(detections, rows)
     plate = corners == "plate"
     told = TakenAsKnown(lenses=intrinsics == "estimate", plate=plate, alike=orientation == "fixed")
     pixels = detections.corners[:, rows]
     bundle = Bundle(pixels, np.ones(pixels.shape[:-1]), detections.pattern.points, lenses, told)
     bundle, state, fitted, steps = _begun(bundle)
     check_left(bundle, state, float(np.nanmedian(detections.sigma[:, rows])))
+    strays = stray_images(bundle, state)
+    noticed = in_words(strays, rows)
+    if strays:
+        bundle, kept = _without(bundle, strays)
+        rows = rows[kept]
+        bundle, state, fitted, more = adjusted(bundle, state.of(kept))
+        steps += more
+    distances = None if tells == "pattern" else spacing_of(spacing, len(detections.numbers)).select(rows)
     if distances is not None:
-        check_spacing(distances, places(bundle, state, fitted, None)[1].r, rows)
+        size = check_spacing(distances, places(bundle, state, fitted, None)[1].r, rows)
         if plate:
-            sized = tells == "spacing"
+            sized = tells == "spacing" or abs(size - 1) > CONTRADICTED
             bundle = replace(bundle, told=replace(told, sized=sized, spacing=distances))
             bundle, state, fitted, more = adjusted(bundle, scaled_by(distances, state, sized))
             steps += more
     state, placed = places(bundle, state, fitted, distances)
+    poses = left_by_poses(bundle, state)
+    beyond = poses.beyond(1 / float(bundle.weights.max()))
+    placed = replace(placed, covariance=beyond * placed.covariance, shared=np.sqrt(beyond) * placed.shared)
     found = _of_all_poses(bundle, state, placed, rows, detections)
-    noticed = suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
+    noticed += suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
+    if not any(each.kind == "images" for each in noticed):
+        noticed += other_moments(poses, rows)
     seconds = time.perf_counter() - begin
     return replace(found, steps=steps, seconds=seconds, findings=(*detections.findings, *noticed))
+
+
+def _without(bundle: Bundle, strays: list[tuple[int, tuple[int, ...]]]) -> tuple[Bundle, Array]:
+    """The bundle without images that do not belong to their poses, and which poses enough cameras saw even so."""
+    pixels = bundle.pixels.copy()
+    for pose, cameras in strays:
+        pixels[list(cameras), pose] = np.nan
+    seen = np.isfinite(pixels[..., 0]).any(axis=2).sum(axis=0)
+    kept = np.flatnonzero(seen >= min(2, len(pixels)))
+    return replace(bundle, pixels=pixels, weights=np.ones(pixels.shape[:-1])).of(kept), kept
 
 
 def _begun(bundle: Bundle) -> tuple[Bundle, State, BlockRows, int]:
@@ -103,12 +134,14 @@ def _of_all_poses(
     points = detections.corners.shape[2]
     r, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
     R, residuals = np.full((count, 3, 3), np.nan), np.full((cameras, count, points, 2), np.nan)
-    r[rows], covariance[rows], R[rows] = placed.r, placed.covariance, state.R
+    shared = np.full((count, *placed.shared.shape[1:]), np.nan)
+    r[rows], covariance[rows], shared[rows], R[rows] = placed.r, placed.covariance, placed.shared, state.R
     residuals[:, rows] = bundle.residuals(state)
     return Reconstruction(
         r=r,
         R=R,
         covariance=covariance,
+        shared=shared,
         cameras=state.cameras,
         rms=float(np.sqrt(np.nanmean(residuals**2))),
         residuals=residuals,

@@ -8,9 +8,9 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
-from gantrytau_optimica.calibration.data.findings import Finding
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.scenes.scene import AHEAD
 
@@ -22,7 +22,8 @@ class Reconstruction(Record):
     """Poses of a pattern from images, in the axes of the first camera: x right, y down, z ahead.
 
     r: middle of the pattern, (N, 3) in m, NaN where it was not seen; R: its orientation, (N, 3, 3); covariance: of r after
-    the best motion of all poses, (N, 3, 3) in m2; cameras: where they stand, with the lenses of the fit; rms: of what is
+    the best motion of all poses, (N, 3, 3) in m2; shared: what poses have in common of it, by the cameras, (N, 3, S) in m;
+    cameras: where they stand, with the lenses of the fit; rms: of what is
     left of image points, in pixels; residuals: (C, N, P, 2) in pixels; scale: the size of the pattern as a multiple of what
     its side says, where spacing tells lengths; lens_deviations: (C, 5) standard deviations of ln focal length, centre in
     pixels, k1, k2, zero where lenses are given; turning: whether orientations differ from pose to pose; seconds: of the
@@ -32,6 +33,7 @@ class Reconstruction(Record):
     r: Array = field(repr=False)
     R: Array = field(repr=False)
     covariance: Array = field(repr=False)
+    shared: Array = field(repr=False)
     cameras: tuple[PlacedCamera, ...] = field(repr=False)
     rms: float
     residuals: Array = field(repr=False)
@@ -73,7 +75,7 @@ class Reconstruction(Record):
         axes = self.R[rows] @ np.asarray(R, dtype=float).T
         r = self.r[rows] - axes @ np.asarray(place, dtype=float)
         found = Measurements(q[rows], r, axes if turning else None, numbers=self.numbers[rows])
-        return found.uncertain(self.covariance[rows])
+        return found.uncertain(self.covariance[rows], self.shared[rows])
 
     def __str__(self) -> str:
         lines = [

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import did_you_mean
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
@@ -88,6 +88,24 @@ def check_words(
         if refused:
             raise VisionError(f"reconstruct: with corners='free' found {refused}; corners='plate' allows it")
     return scale
+
+
+def check_facing(detections: Detections, rows: np.ndarray) -> None:
+    """VisionError where a camera sees the pattern from behind, as in mirrored images."""
+    points = detections.pattern.points[:, :2]
+    for c, corners in enumerate(detections.corners[:, rows]):
+        seen = np.isfinite(corners[..., :1])
+        count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
+        away = np.where(seen, corners, 0.0)
+        away = np.where(seen, away - away.sum(axis=1, keepdims=True) / count, 0.0)
+        # the images of right and up turn about each other the other way, as pixels count downwards
+        behind = np.linalg.det(np.swapaxes(away, 1, 2) @ points) > 0
+        known = seen.any(axis=(1, 2))
+        if behind[known].sum() > known.sum() / 2:
+            raise VisionError(
+                f"reconstruct: camera {c + 1} sees the pattern from behind in {rows_in_words(rows[known & behind])}, "
+                "expected from the front; its images are mirrored, or corners numbered the other way round: flip them"
+            )
 
 
 def usable_poses(detections: Detections) -> np.ndarray:

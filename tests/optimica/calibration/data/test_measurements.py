@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_optimica import Measurements
-from gantrytau_optimica.calibration.data.findings import rows_in_words
+from gantrytau_optimica.fitting.finding import rows_in_words
 
 RNG = np.random.default_rng(0)
 Q, T = RNG.uniform(size=(12, 3)), RNG.uniform(size=(12, 3))

@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import CalibrationError, Measurements, calibrate
+from tests.families import first_of
 from tests.optimica.calibration import synthetic_d1
 from tests.optimica.calibration.synthetic import NOISE, grid, nominal
 
@@ -183,3 +184,16 @@ def test_a_prior_speaks_of_nominal_values_in_any_frame(poses, start):
     )
     for name in (f"arms[{i}].length" for i in range(3)):
         assert found.parameters[name] == pytest.approx(found.nominal_rods.values[name], abs=1e-6)
+
+
+@pytest.mark.parametrize("size", first_of([0.01, 0.001, 0.05, 0.2]))
+@pytest.mark.parametrize("holdout", first_of(["second", None]))
+def test_one_wrong_pose_is_told_alone(size, holdout):
+    """What data hold is decided by the noise of the others: they hold all lengths, and their deviations."""
+    q, r = grid(prototypes.L1, 80)
+    r = r + NOISE * np.random.default_rng(1).standard_normal(r.shape)
+    r[10, 0] += size
+    found = calibrate(nominal(), Measurements(q, r), holdout=holdout)
+    assert [(finding.kind, finding.rows.tolist()) for finding in found.findings] == [("outliers", [10])]
+    assert found.rank == 21
+    assert found.covariance(["arms[0].length"]).shape == (1, 1)

@@ -94,3 +94,20 @@ def test_a_size_that_spacing_contradicts_is_told():
     images = of(pattern=Pattern.quincunx(0.063))
     found = reconstruct(images, BOTH, spacing=Q, scale="spacing")
     assert [finding.kind for finding in found.findings] == ["size"]
+
+
+def test_a_side_that_spacing_contradicts_is_named_first():
+    found = reconstruct(of(pattern=Pattern.quincunx(0.05)), BOTH, spacing=Q)
+    assert [finding.kind for finding in found.findings] == ["size"]
+    assert "+20 % larger than its side says; measure both; lengths are those of spacing" in str(found)
+    assert found.scale == pytest.approx(1.2, rel=1e-3)
+
+
+@pytest.mark.parametrize("cameras", [[0], [0, 1]])
+def test_mirrored_images_are_told(cameras):
+    corners = IMAGES.corners.copy()
+    corners[cameras, ..., 0] = 1023 - corners[cameras, ..., 0]
+    with pytest.raises(
+        VisionError, match=r"camera 1 sees the pattern from behind in .* its images are mirrored"
+    ):
+        reconstruct(of(corners=corners), BOTH)

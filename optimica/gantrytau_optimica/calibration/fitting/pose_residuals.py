@@ -1,0 +1,167 @@
+"""What measured poses leave of a robot whose parameters have names, and least squares of it.
+
+    e = exp([w]x) R0 m + t - r(q, p)       of places m, in the base of the robot
+    a = vector(exp([w]x) R0 M R(q, p)')    of orientations M, by a lever as long as noise of places is to that of turns
+
+x = (w, t, p); w and t are there where poses were measured in any frame. Rows count by the certainty of their pose.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gantrytau import Model
+from gantrytau.describing.record import Record
+from gantrytau.kinematics.rotations import left_jacobian, motion, of_vector, rotation_vector, skewed
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum, gauss_newton
+from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
+from gantrytau_optimica.calibration.rods.arm_factors import LEVER
+from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.fitting.robust import BISQUARE, OUTLIER, limit, robust_deviation, without_strays
+
+Array = np.ndarray
+FRAME = tuple(f"frame.{part}[{k}]" for part in ("R", "t") for k in range(3))
+ROUNDS = 30  # of reweighting, and of finding noise and lever
+LEAST = 1e-12  # m, of the noise: rounding of places of metres
+
+
+@dataclass(frozen=True, eq=False)
+class PoseResiduals(Record):
+    """tool: of the robot; data: measured poses, all finite; turn: R0 (3, 3), or None where poses are in the base; lever: of
+    turns, m; weights: of poses, (N,); prior: value and deviation by the place of a number in x.
+    """
+
+    tool: ToolFunction
+    data: Measurements
+    turn: Array | None
+    lever: float
+    weights: Array
+    prior: Mapping[int, tuple[float, float]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the numbers x."""
+        return self.tool.names if self.turn is None else (*FRAME, *self.tool.names)
+
+    @property
+    def scale(self) -> Array:
+        """What of each number moves the tool by about a metre."""
+        return (
+            self.tool.scale
+            if self.turn is None
+            else np.array([1 / LEVER] * 3 + [1.0] * 3 + [*self.tool.scale])
+        )
+
+    def frame(self, x: Array) -> tuple[Array, Array, Array]:
+        """R and t of base = R measured + t, and p."""
+        if self.turn is None:
+            return np.eye(3), np.zeros(3), x
+        return of_vector(x[:3]) @ self.turn, x[3:6], x[6:]
+
+    def poses(self, x: Array) -> Array:
+        """E and a of each pose, (N, 3 or 6), without weights."""
+        R, t, p = self.frame(x)
+        r, turned = self.tool(self.data.q, p)
+        e = self.data.r @ R.T + t - r
+        if turned is None or self.data.R is None:
+            return e
+        return np.hstack([e, self.lever * rotation_vector(R @ self.data.R @ np.swapaxes(turned, 1, 2))])
+
+    def slopes(self, x: Array) -> Array:
+        """Their derivatives by x, (N, 3 or 6, n)."""
+        R, _, p = self.frame(x)
+        units = np.repeat([1.0, self.lever], 3)[: 6 if self.tool.turning else 3]
+        found = -self.tool.slopes(self.data.q, p) * units[:, None]
+        if self.turn is None:
+            return found
+        count, rows = found.shape[:2]
+        by_frame = np.zeros((count, rows, 6))
+        by_frame[:, :3, :3] = -skewed(self.data.r @ R.T) @ left_jacobian(x[:3])
+        by_frame[:, :3, 3:] = np.eye(3)
+        if rows == 6:
+            by_frame[:, 3:, :3] = self.lever * left_jacobian(x[:3])
+        return np.concatenate([by_frame, found], axis=2)
+
+    def minimum(self, x: Array, noise: float) -> Minimum:
+        """Least squares from x; what poses tell less of than a tape measure stays there, by the noise, m."""
+        places, values = list(self.prior), list(self.prior.values())
+
+        def errors(x: Array) -> Array:
+            left = (self.poses(x) * self.weights[:, None]).ravel()
+            return np.concatenate(
+                [left, [noise * (x[i] - m) / d for i, (m, d) in zip(places, values, strict=True)]]
+            )
+
+        def slopes(x: Array) -> Array:
+            rows = np.eye(len(x))[places] * np.array([[noise / d] for _, d in values]).reshape(-1, 1)
+            J = (self.slopes(x) * self.weights[:, None, None]).reshape(-1, len(x))
+            return np.vstack([J, rows]) * self.scale
+
+        free = np.ones(len(x), dtype=bool)
+        return gauss_newton(errors, slopes, x, free, scale=self.scale, smallest=noise / TAPE * (1 - 1e-6))
+
+    def robust(self, x: Array) -> tuple[Array, float, float]:
+        """What a fit that strays do not lead would leave, (N, 3 or 6) by its weights, and deviations of places and turns."""
+        J = (self.slopes(x) * self.weights[:, None, None]).reshape(-1, len(x)) * self.scale
+        left = (self.poses(x) * self.weights[:, None]).ravel()
+        used = np.repeat(self.weights > 0, len(left) // len(self.weights))
+        left[used] = without_strays(left[used], J[used])
+        left, rank = left.reshape(len(self.weights), -1), int(np.linalg.matrix_rank(J))
+        seen = left[self.weights > 0]
+        share = [rank // 2, rank // 2] if self.tool.turning else [rank]
+        sizes = [robust_deviation(seen[:, 3 * k : 3 * k + 3].ravel(), n) for k, n in enumerate(share)]
+        return left, max(sizes[0], LEAST), max(sizes[-1], LEAST)
+
+
+def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseResiduals, Array]:
+    """The residuals and where their numbers begin: nominal values, in the frame in which these fit best."""
+    sure = np.ones(len(data)) if data.certainty is None else data.certainty
+    if not framed:
+        return PoseResiduals(tool, data, None, LEVER, sure, {}), tool.nominal
+    r, _ = tool(data.q, tool.nominal)
+    there = np.isfinite(r).all(axis=1)
+    turn, shift = motion(data.r[there], r[there])
+    return PoseResiduals(tool, data, turn, LEVER, sure, {}), np.concatenate(
+        [np.zeros(3), shift, tool.nominal]
+    )
+
+
+def named_slopes(robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any) -> Array:
+    """Slopes of poses (q, r, R) by named parameters and a frame, (N, 3 or 6, n), each number by what moves a metre."""
+    q, r, R = poses
+    tool = tool_function(robot, parameters, joints, R is not None)
+    residuals, x = started(tool, Measurements(q, r, R), True)
+    return residuals.slopes(x) * residuals.scale
+
+
+def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResiduals, Minimum, float]:
+    """The least squares where noise, the lever of turns and, of a robust loss, Tukey's weights have settled."""
+    sure, noise, begin = residuals.weights, 0.0, x
+    minimum = residuals.minimum(x, noise)
+    for _ in range(ROUNDS):
+        before = noise
+        _, noise, turned = residuals.robust(minimum.x)
+        lever = residuals.lever * (noise / turned if residuals.tool.turning else 1.0)
+        weights = sure
+        if robust:
+            sizes = np.abs(replace(residuals, weights=sure).robust(minimum.x)[0]).max(axis=1) / noise
+            weights = sure * np.maximum(1 - (sizes / BISQUARE) ** 2, 0.0)
+        settled = abs(noise - before) < 0.01 * noise and np.abs(weights - residuals.weights).max() < 1e-3
+        residuals = replace(residuals, lever=float(np.clip(lever, 1e-3, 1e3)), weights=weights)
+        held = minimum.rank == len(x) and minimum.singular.min() > noise / TAPE
+        minimum = residuals.minimum(minimum.x if held else begin, noise)
+        if settled:
+            break
+    return residuals, minimum, noise
+
+
+def strays(residuals: PoseResiduals, x: Array) -> Array:
+    """Places of poses that are off by more than noise explains."""
+    sure = residuals.data.certainty
+    every = replace(residuals, weights=np.ones(len(residuals.data)) if sure is None else sure)
+    left, noise, turned = every.robust(x)
+    sizes = np.abs(left / np.repeat([noise, turned], 3)[: left.shape[1]]).max(axis=1)
+    return np.flatnonzero(sizes > max(OUTLIER, limit(left.size - len(x))))

@@ -1,0 +1,1 @@
+"""Calibration of any robot by the names of its parameters."""

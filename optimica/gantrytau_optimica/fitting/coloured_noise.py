@@ -1,0 +1,29 @@
+"""Noise whose neighbours are not independent, known by its averaged spectrum.
+
+cov(x'e) = sum_f conj(X_f)' X_f S_f / N          S: periodogram of e, averaged over neighbouring frequencies
+"""
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+
+def averaged_spectrum(left: np.ndarray, width: int | None = None, used: float = 1.0) -> np.ndarray:
+    """Power of what is left (N,) at the frequencies of rfft; width: frequencies in a mean; used: share of rows not zero."""
+    power = np.abs(np.fft.rfft(left)) ** 2 / (len(left) * used)
+    return uniform_filter1d(power, max(3, width or round(len(power) ** 0.5)), mode="reflect")
+
+
+def product_covariance(x: np.ndarray, spectrum: np.ndarray) -> np.ndarray:
+    """Covariance (k, k) of x'e for columns x (N, k) and noise e of a spectrum."""
+    count = len(x)
+    seen = np.fft.rfft(x, axis=0)
+    twice = np.full(len(spectrum), 2.0)  # but the mean, and the last of an even count
+    twice[0] = 1.0
+    twice[-1] = 1.0 if count % 2 == 0 else 2.0
+    return np.real(np.conj(seen).T @ (seen * (twice * spectrum)[:, None])) / count
+
+
+def independent_share(spectrum: np.ndarray) -> float:
+    """Share of the rows that tell the size of the noise as so many independent ones would (Bartlett, 1946)."""
+    square = float(np.mean(spectrum**2))
+    return min(1.0, float(np.mean(spectrum)) ** 2 / square) if square > 0 else 1.0
