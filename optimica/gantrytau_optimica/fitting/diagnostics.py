@@ -194,11 +194,11 @@ def repeated(courses: Mapping[str, np.ndarray]) -> list[Fact]:
 def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
     from scipy.special import fdtrc
 
-    k = one.jacobian.shape[1]
-    if measured is None or not k:
+    if measured is None or all(s.jacobian is None for s in one.series):
         return
-    whole, rest = float(measured @ measured), float(one.left @ one.left)
-    chance = float(fdtrc(k, one.freedom, max(whole - rest, 0.0) / k / (rest / one.freedom)))
+    k, whole, rest = one.jacobian.shape[1], float(measured @ measured), float(one.left @ one.left)
+    gained = max(whole - rest, 0.0) / max(k, 1) / (rest / one.freedom)
+    chance = float(fdtrc(k, one.freedom, gained)) if k else 1.0
     if chance > CHANCE:
         yield Fact("explains nothing", one.name, share=max(1 - rest / whole, 0.0), probability=chance)
 
@@ -243,7 +243,7 @@ def _correlation(one: _Quantity) -> tuple[float, float]:
     most = CLIPPED * max(robust_deviation(one.left), 1e-300)
     product = square = pairs = 0.0
     for s in one.series:
-        step = max(1, round(1 / s.band))
+        step = max(1, int(np.ceil(1 / s.band - 1e-9)))
         for begin in range(step):
             e = np.clip(s.left[begin::step], -most, most)
             both = np.isfinite(e[1:]) & np.isfinite(e[:-1])

@@ -43,7 +43,7 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
                 f"at least {PERIODS / cutoff:g} s"
             )
             findings.append(Finding("gaps", bad, words))
-        told = [f for f in log.findings if f.kind not in LEFT_OUT]
+        told = [f for f in log.findings if f.kind not in LEFT_OUT or (f.kind == "time" and not lost)]
         where = f"log {number}: " if len(logs) > 1 else ""
         findings += [replace(f, message=f"{where}{f.message}") for f in told]
     if not kept:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gantrytau import Model, translate
 from gantrytau.dae import Dae
+from gantrytau_optimica.fitting.diagnostics import diagnose
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
@@ -25,6 +26,7 @@ from gantrytau_optimica.identification.rigid.fit_findings import (
     half_against_half,
     usable_parts,
 )
+from gantrytau_optimica.identification.rigid.force_diagnostics import force_diagnostics
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
@@ -94,10 +96,12 @@ def identify(
     found, rows = minimum(problem, limits, nonlinear)
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot)
+    answer = replace(answer, diagnostics=force_diagnostics(problem, found, rows, logs))
     doubts = (
         *held_findings,
         *fit_findings(problem.names, found, answer.weak, nonlinear),
         *second_looks(problem, found, rows, given),
+        *answer.diagnostics.findings,
     )
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
@@ -190,5 +194,6 @@ def _identified(
         model_values=values,
         held_out=np.nan,
         findings=(),
+        diagnostics=diagnose(()),
         nominal=robot if isinstance(robot, Model) else None,
     )
