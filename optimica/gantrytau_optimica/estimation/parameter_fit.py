@@ -1,7 +1,7 @@
 """Fitted parameters: how sure they are, and what is left of the data."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,11 +11,16 @@ from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, told_twice
+from gantrytau_optimica.estimation.fit_diagnostics import coloured_product, output_series
 from gantrytau_optimica.estimation.mesh_error import COARSE
 from gantrytau_optimica.estimation.weights import median_deviation
+from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
 COMPUTED = 1e-6  # of the data: residuals that no measurement leaves
+COLOURED = ("not white", "trend", "drift", "delay")  # facts of residuals that are no noise
+ROBUST = ("outliers", "group", "noise larger", "noise smaller")  # what a robust fit expects
+STRAYS = "look at them, leave them out, or take loss='robust'"
 ENDS = {
     "time": "raise max_time=",
     "lost": "raise elements=, or give guess= of the motion",
@@ -93,7 +98,21 @@ class ParameterFit(Record):
         _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
         root = right.T / singular / norms[:, None]
         shift = np.nan_to_num([self.mesh_shift[n] for n in self.names])
-        return root @ root.T * self._factor + np.outer(shift, shift)
+        inverse = root @ root.T
+        coloured = self.loss == "squares" and any(f.kind in COLOURED for f in self.diagnostics.facts)
+        told = inverse @ coloured_product(self._series) @ inverse if coloured else inverse * self._factor
+        return told + np.outer(shift, shift)
+
+    @cached_property
+    def _series(self) -> list[ResidualSeries]:
+        return output_series(self.experiments, self.errors, self.jacobian, self.scales, self.known)
+
+    @cached_property
+    def diagnostics(self) -> Diagnostics:
+        """What is left of each output: explained share, size against given deviations, whiteness, strays, trends."""
+        squares = self.loss == "squares"
+        found = diagnose(self._series, remedies={"outliers": STRAYS})
+        return replace(found, facts=tuple(f for f in found.facts if squares or f.kind not in ROBUST))
 
     @property
     def _factor(self) -> float:
@@ -183,12 +202,7 @@ class ParameterFit(Record):
             found.append(
                 "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them"
             )
-        if self.known and self.loss == "squares" and self.probability < 1e-3:
-            found.append(
-                f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
-                "small, or the model is wrong"
-            )
-        return (*found, *self._computed())
+        return (*found, *(f.message for f in self.diagnostics.findings), *self._computed())
 
     def _computed(self) -> list[str]:
         """Words for outputs without deviations that the model meets as closely as only computed values are met."""

@@ -24,6 +24,7 @@ CHANCE = 1e-5  # of a finding on sound data, by each test
 SURE = 5.0  # deviations, of a trend: its spectrum is an estimate
 FOLLOWS = 0.1  # of what is left, that a trend must be to be told
 COMPUTED = 1e-6  # of the signal: what computed data leave, that have no noise
+ALIKE = ("explains nothing", "not white")  # facts that quantities have together
 FEW = 8  # rows, below which nothing is asked
 CLIPPED = 5.0  # robust deviations: a single stray is no group
 
@@ -36,7 +37,7 @@ class ResidualSeries:
     what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: slopes of the model by what was
     fitted (N, k); signals: known ones (N,) that it may follow, "q of x", "v of x", "a of x", "sign v of x", "1", "time" in
     s, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run", "sensor"; rows: their numbers
-    in the data; band: share of the frequencies that a filter has left.
+    in the data; run: its name, where there are several; band: share of the frequencies that a filter has left.
     """
 
     name: str
@@ -47,6 +48,7 @@ class ResidualSeries:
     signals: Mapping[str, np.ndarray] = field(default_factory=dict)
     groups: Mapping[str, np.ndarray] = field(default_factory=dict)
     rows: np.ndarray | None = None
+    run: str = ""
     band: float = 1.0
 
     @cached_property
@@ -82,8 +84,15 @@ class Diagnostics(Record):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The facts in words, the likeliest causes first."""
-        return tuple(fact.finding for fact in self.facts)
+        """The facts in words, the likeliest causes first; what all quantities have alike is told once."""
+        told: dict[str, Fact] = {}
+        for k, fact in enumerate(self.facts):
+            key = fact.kind if fact.kind in ALIKE else f"{fact.kind} {k}"
+            before = told.get(key)
+            told[key] = (
+                fact if before is None else replace(before, quantity=f"{before.quantity}, {fact.quantity}")
+            )
+        return tuple(fact.finding for fact in told.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,11 +240,12 @@ def _of_order(
     elif correlation > least:
         yield Fact("not white", one.name, correlation, held=least)
     else:
-        far = np.abs(one.robust) / max(one.scale, 1e-300)
-        rows = np.concatenate([s.numbers for s in one.series])
-        strays = far > limit(len(far) - one.jacobian.shape[1])
-        if strays.any() and one.scale > 0:
-            yield Fact("outliers", one.name, float(far.max()), rows[strays])
+        most = limit(len(one.left) - one.jacobian.shape[1])
+        for s in one.series if one.scale > 0 else ():
+            far = np.abs(one.robust[one.of(s)]) / one.scale
+            if np.any(far > most):
+                name = f"{one.name} of {s.run}" if len(one.series) > 1 and s.run else one.name
+                yield Fact("outliers", name, float(far.max()), s.numbers[far > most])
 
 
 def _correlation(one: _Quantity) -> tuple[float, float]:

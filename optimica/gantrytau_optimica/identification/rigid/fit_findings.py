@@ -19,9 +19,15 @@ PERIODS = 10  # of the cutoff, which a stretch must last to be filtered
 WORSE = 1.5  # times what a fit leaves where it was made, above which held-out rows contradict it
 
 
-def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionLog], list[Finding]]:
-    """Stretches without gaps that a filter can pass, and what was left out. IdentificationError where nothing is left."""
-    kept, findings = [], []
+def usable_parts(
+    logs: Sequence[MotionLog], cutoff: float
+) -> tuple[list[tuple[tuple[int, int], MotionLog]], list[Finding]]:
+    """Stretches without gaps that a filter can pass, with number of log and first row, and what was left out.
+
+    Raises IdentificationError where nothing is left.
+    """
+    kept: list[tuple[tuple[int, int], MotionLog]] = []
+    findings: list[Finding] = []
     if not 0 < cutoff < np.inf:
         raise IdentificationError(
             f"identify: found cutoff={cutoff!r}, expected a frequency in Hz above 0", argument="cutoff"
@@ -29,7 +35,7 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
     for number, log in enumerate(logs):
         parts = log.parts()
         long = [p for p in parts if len(p) > 1 and (p.t[-1] - p.t[0]) * cutoff >= PERIODS]
-        kept += long
+        kept += [((number, int(np.flatnonzero(log.t == part.t[0])[0])), part) for part in long]
         lost = len(log) - sum(map(len, long))
         if lost:
             bad = np.flatnonzero(~log.finite)

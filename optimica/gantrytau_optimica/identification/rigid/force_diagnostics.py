@@ -18,13 +18,15 @@ PULLED = 5.0  # deviations beyond a limit, from which on data contradict it
 def force_diagnostics(
     problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows], logs: Sequence[MotionLog]
 ) -> Diagnostics:
-    """Of filtered forces; logs: as they were given, to see whether one comes twice."""
+    """Of filtered forces; logs: as they were given, of which rows are told, and whether one comes twice."""
     free = found.base.independent[~found.active[found.base.independent]]
     series = []
     for run, (one, motion) in enumerate(zip(rows, problem.motions, strict=True)):
         signals = motion.filtered(motion.motion)
         signs = motion.filtered(motion.thin(np.sign(motion.speed)))
         n = signs.shape[1]
+        number, first = motion.origin
+        numbers = first + motion.inner * motion.thinned
         for i, name in enumerate(problem.dynamics.coordinates):
             words = ("q", "v", "a")
             known = {f"{word} of {name}": signals[:, i + k * n] for k, word in enumerate(words)}
@@ -37,7 +39,9 @@ def force_diagnostics(
                     measured=one.b[:, i],
                     jacobian=one.A[:, i, free],
                     signals=known,
-                    groups={"run": np.full(len(signs), run)},
+                    groups={"part": np.full(len(signs), run)},
+                    rows=numbers,
+                    run=f"log {number}",
                     band=min(1.0, PASSED * 2 * one.cutoff * one.period),
                 )
             )
@@ -57,5 +61,7 @@ def _pulls(names: Sequence[str], found: LimitedFit, rows: Sequence[LogRows], fre
         deviation = float(np.sqrt(covariance(rows, p, places)[k, k]))
         beyond = float((found.p[k] - p[k]) / deviation) if deviation > 0 else 0.0
         if beyond > PULLED:
-            facts.append(Fact("limit", names[k], held=float(found.p[k]), wanted=float(p[k]), deviations=beyond))
+            facts.append(
+                Fact("limit", names[k], held=float(found.p[k]), wanted=float(p[k]), deviations=beyond)
+            )
     return facts

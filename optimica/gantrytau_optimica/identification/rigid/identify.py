@@ -85,7 +85,7 @@ def identify(
     problem = RigidRegression(
         RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given), rigid),
         FrictionColumns(len(coordinates), friction, known) if friction else None,
-        [filtered_motion(part, cutoff) for part in parts],
+        [replace(filtered_motion(part, cutoff), origin=origin) for origin, part in parts],
         minimum_speed,
     )
     problem = problem if parameters else problem.without_silent()

@@ -26,6 +26,7 @@ class FilteredMotion:
 
     log_period: s, of the log, of whose rows each `thinned`th is kept; v, speed (all rows of the log, n): the second filtered
     by H, for the sign of friction and the dead zone. That sign jumps, so friction is filtered before it is thinned.
+    origin: number of the log, and of its row that is the first here.
     """
 
     log_period: float
@@ -35,6 +36,7 @@ class FilteredMotion:
     v: np.ndarray
     speed: np.ndarray
     f: np.ndarray
+    origin: tuple[int, int] = (0, 0)
 
     @property
     def period(self) -> float:
@@ -52,6 +54,11 @@ class FilteredMotion:
     def moving(self, minimum_speed: float) -> np.ndarray:
         """Where a joint is faster than the dead zone, (N, n), without the ends."""
         return self._inner(np.abs(self.speed[:: self.thinned]) >= minimum_speed)
+
+    @property
+    def inner(self) -> np.ndarray:
+        """Numbers of the rows that the ends leave, from 0."""
+        return self._inner(np.arange(len(self.motion)))
 
     def _inner(self, y: np.ndarray) -> np.ndarray:
         ends = round(ENDS / self.cutoff / self.period)
