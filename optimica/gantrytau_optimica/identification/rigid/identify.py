@@ -30,6 +30,7 @@ from gantrytau_optimica.identification.rigid.force_diagnostics import force_diag
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
+from gantrytau_optimica.identification.rigid.position_noise import unbiased
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
@@ -94,10 +95,13 @@ def identify(
     if friction == "stribeck":
         problem = _with_fall(problem, limits, nonlinear)
     found, rows = minimum(problem, limits, nonlinear)
+    clean = unbiased(problem, found, rows, [part for _, part in parts])
+    found = clean.fit
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
-    answer = _identified(problem, found, rows, robot)
+    answer = _identified(problem, found, rows, robot, clean.errors)
     answer = replace(answer, diagnostics=force_diagnostics(problem, found, rows, logs))
     doubts = (
+        *clean.findings,
         *held_findings,
         *fit_findings(problem.names, found, answer.weak, nonlinear),
         *second_looks(problem, found, rows, given),
@@ -151,12 +155,12 @@ def _second(count: int) -> slice:
 
 
 def _identified(
-    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model | Dae
+    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model | Dae, errors: np.ndarray
 ) -> Identification:
-    """The record of a fit."""
+    """The record of a fit; errors: factor (k, k) of its errors beside those of least squares."""
     names, p = problem.names, found.p
     free = found.base.independent[~found.active[found.base.independent]]
-    matrix = covariance(rows, p, free)
+    matrix = errors @ covariance(rows, p, free) @ errors.T
     matrix[found.base.dependent, found.base.dependent] = np.nan
     deviations = np.sqrt(np.diag(matrix))
     told = (found.inflation <= INFLATED) & (2 * deviations <= np.abs(p))

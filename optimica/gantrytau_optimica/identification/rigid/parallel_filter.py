@@ -17,7 +17,7 @@ ORDER = 4
 WIDER = 4.0  # times the cutoff, of the filter before encoders are differentiated
 SAMPLES = 10.0  # kept for each period of the cutoff
 JITTER = 0.02  # of a period, by which steps of time may differ before they are made even
-ENDS = 0.5  # periods of the cutoff at either end, in which the filter knows one side only
+ENDS = 2.0  # periods of the cutoff at either end, in which the filter knows one side only
 
 
 @dataclass(frozen=True, eq=False)
