@@ -80,7 +80,8 @@ class MotionLog(Record):
         """The log that a simulated motion would give: samples every `period` s, with white noise.
 
         result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
-        the same for the same seed. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
+        the same for the same seed. Forces that jump, as those of sampled controllers do, are means over the period around
+        each sample; of a run of `Rig` they are `measured.f`. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
         one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
         for a result with outputs farther apart than that.
         """
@@ -92,7 +93,13 @@ class MotionLog(Record):
         joints = driven_joints(robot if isinstance(robot, Dae) else translate(robot, units=False))
         drives = [f"{name[:-2]}.f" if name.endswith(".s") else f"{name[:-4]}.tau" for name in joints]
         t = instants(result, 1 / period)
-        q, f = (np.column_stack([result.at(t, name) for name in names]) for names in (joints, drives))
+        q = np.column_stack([result.at(t, name) for name in joints])
+        if "measured.f" in result.arrays:
+            f = result.at(t, "measured.f")
+        elif np.any(np.diff(result.time) == 0):
+            f = np.column_stack([_means(result, name, t, period) for name in drives])
+        else:
+            f = np.column_stack([result.at(t, name) for name in drives])
         noise = np.random.default_rng(seed).normal(size=(2, *q.shape))
         r = result.at(t, "tool.r") if "tool.r" in result.arrays else None
         return cls(t, q + encoder * noise[0], f + force * noise[1], r=r)
@@ -152,6 +159,23 @@ class MotionLog(Record):
         )
         ends = np.flatnonzero(np.logical_or(np.diff(kept) > 1, crossed)) + 1
         return tuple(self[rows] for rows in np.split(kept, ends) if rows.size)
+
+
+def _means(result: Result, name: str, t: np.ndarray, period: float) -> np.ndarray:
+    """Means of a variable around each time (N,), as its impulses on both sides, a period long, move sampled positions."""
+    time, values = result.time, result[name]
+    slopes = np.diff(values) / np.where(np.diff(time) > 0, np.diff(time), np.inf)
+    impulse = np.append(0.0, np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2))
+    steps = np.diff(time)
+    moved = np.append(0.0, np.cumsum(steps * impulse[:-1] + steps**2 * (2 * values[:-1] + values[1:]) / 6))
+
+    def at(when: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
+        x = when - time[k]
+        return moved[k] + x * impulse[k] + x**2 * values[k] / 2 + x**3 * slopes[k] / 6
+
+    inner = np.clip(t, time[0] + period, time[-1] - period)  # at both ends those of the neighbours
+    return (at(inner + period) - 2 * at(inner) + at(inner - period)) / period**2
 
 
 def join(logs: Sequence[MotionLog]) -> MotionLog:
