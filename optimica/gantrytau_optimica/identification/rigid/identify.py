@@ -62,10 +62,11 @@ def identify(
 
     robot: any model, or what `translate` made of it, of any loops, whose inputs are the forces or torques of its drives,
     with `s` or `phi` beside them; log: one or several, q and f in the order of these inputs. parameters: names or
-    families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces.
+    families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces, and
+    the friction of the model (f_c, f_v, f_s) where it is kept.
     The name of a body, `tool`, stands for its ten: mass, `tool.moment[i]` in kg.m, `tool.inertia[i,j]` in kg.m2 about the
     origin of its frame. fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0
-    leaves links out. friction: the law that is identified in place of the model's, None keeps that; the speed of
+    leaves links out. friction: the law that is identified in place of the model's, None keeps that law; the speed of
     "stribeck" is one for all joints, looked for between 0.01 and 1. physical: no mass and no friction below the limits
     that the model declares, no body without a density (pseudo-inertia). cutoff: Hz, of the zero-phase filter of both
     sides; minimum_speed: m/s or rad/s, below which a joint's rows do not count; twice Stribeck's keeps that out of the
@@ -84,7 +85,7 @@ def identify(
     rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
     rigid |= dict.fromkeys(frictions(dae), 0.0) if friction else {}
     problem = RigidRegression(
-        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given), rigid),
+        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given, friction), rigid),
         FrictionColumns(len(coordinates), friction, known) if friction else None,
         [replace(filtered_motion(part, cutoff), origin=origin) for origin, part in parts],
         minimum_speed,
