@@ -85,9 +85,10 @@ class Rig:
         has N rows, at these times: joints, forces and friction by their names in the robot, `tool.r`, `gauge.r` and
         `accelerometer.a` where it has them, `q_ref` and `v_ref`; readings with noise are `measured.q`, `measured.r` (of
         the gauge, else of the tool), `measured.f` and `measured.a`, the means over a period around each sample: forces
-        that change with the clock shake a robot at multiples of it, which single values would take for slow motion. Equal seeds draw the
-        same friction and noise: take another for each run. Raises ModelError for references of another shape or not
-        finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation stops.
+        that change with the clock shake a robot at multiples of it, which single values would take for slow motion. Equal
+        seeds draw the same friction and noise: take another for each run. Raises ModelError for references of another
+        shape or not finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation
+        stops.
         """
         q_ref = self._reference("position", position)
         v_ref = np.zeros_like(q_ref) if velocity is None else self._reference("velocity", velocity)

@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
+from gantrytau_optimica.identification.logs.lost_rows import lost_rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,8 +82,8 @@ class MotionLog(Record):
 
         result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
         the same for the same seed. Forces that jump, as those of sampled controllers do, are means over the period around
-        each sample; of a run of `Rig` they are `measured.f`. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
-        one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
+        each sample; of a run of `Rig` they are `measured.f`. Columns follow the inputs of the robot, lengths first; r is
+        that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
         for a result with outputs farther apart than that.
         """
         if not (0 < period < np.inf and encoder >= 0 and force >= 0):
@@ -141,10 +142,25 @@ class MotionLog(Record):
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "millimetres", "saturated force",
-        "slow", "constant velocity", "delay", "sign of force".
+        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "lost rows", "millimetres",
+        "saturated force", "slow", "constant velocity", "delay", "sign of force".
         """
         return check_log(self.t, self.q, self.f, self.finite)
+
+    def without_lost_rows(self) -> tuple[Self, np.ndarray]:
+        """The log with rows that were lost between others put in by cubic splines, without v and r; and for each of its rows
+        the number of the row here that is the next.
+        """
+        rows = np.arange(len(self))
+        lost = lost_rows(self.t, self.q) if np.all(self.finite) else np.zeros(len(self), dtype=int)
+        if not lost.any():
+            return self, rows
+        from scipy.interpolate import make_interp_spline
+
+        places = rows + np.cumsum(lost)
+        whole = np.arange(places[-1] + 1)
+        q, f = (make_interp_spline(places, x, k=3)(whole) for x in (self.q, self.f))
+        return type(self)(self.t[0] + self.period * whole, q, f), np.searchsorted(places, whole)
 
     def parts(self) -> tuple[Self, ...]:
         """The stretches between gaps, times that do not rise, and rows without numbers: to be differentiated one by one."""

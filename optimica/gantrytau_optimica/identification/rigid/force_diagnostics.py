@@ -25,8 +25,6 @@ def force_diagnostics(
         signals = motion.filtered(motion.motion)
         signs = motion.filtered(motion.thin(np.sign(motion.speed)))
         n = signs.shape[1]
-        number, first = motion.origin
-        numbers = first + motion.inner * motion.thinned
         for i, name in enumerate(problem.dynamics.coordinates):
             words = ("q", "v", "a")
             known = {f"{word} of {name}": signals[:, i + k * n] for k, word in enumerate(words)}
@@ -40,8 +38,8 @@ def force_diagnostics(
                     jacobian=one.A[:, i, free],
                     signals=known,
                     groups={"part": np.full(len(signs), run)},
-                    rows=numbers,
-                    run=f"log {number}",
+                    rows=motion.inner,
+                    run=f"log {motion.origin[0]}",
                     band=min(1.0, PASSED * 2 * one.cutoff * one.period),
                 )
             )

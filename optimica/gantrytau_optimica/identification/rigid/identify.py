@@ -41,6 +41,8 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 )
 
 FALLS = (0.01, 1.0)  # m/s between which a Stribeck speed is looked for
+CAUSES = ("delay", "law of friction", "fixed", "noise of positions")  # of what else is left
+SIGNS = ("not white", "outliers")  # told where no cause is
 INFLATED = (
     10.0  # times the deviation that a parameter would have alone: errors of the model weigh as much more
 )
@@ -106,8 +108,9 @@ def identify(
         *held_findings,
         *fit_findings(problem.names, found, answer.weak, nonlinear),
         *second_looks(problem, found, rows, given),
-        *answer.diagnostics.findings,
     )
+    explained = any(f.kind in CAUSES for f in doubts)
+    doubts += tuple(f for f in answer.diagnostics.findings if not (explained and f.kind in SIGNS))
     noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
     answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
     held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}

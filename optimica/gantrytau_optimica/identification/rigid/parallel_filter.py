@@ -26,7 +26,7 @@ class FilteredMotion:
 
     log_period: s, of the log, of whose rows each `thinned`th is kept; v, speed (all rows of the log, n): the second filtered
     by H, for the sign of friction and the dead zone. That sign jumps, so friction is filtered before it is thinned.
-    origin: number of the log, and of its row that is the first here.
+    origin: number of the log, and of its rows.
     """
 
     log_period: float
@@ -36,7 +36,7 @@ class FilteredMotion:
     v: np.ndarray
     speed: np.ndarray
     f: np.ndarray
-    origin: tuple[int, int] = (0, 0)
+    origin: tuple[int, np.ndarray] = (0, np.zeros(1, dtype=int))
 
     @property
     def period(self) -> float:
@@ -57,8 +57,9 @@ class FilteredMotion:
 
     @property
     def inner(self) -> np.ndarray:
-        """Numbers of the rows that the ends leave, from 0."""
-        return self._inner(np.arange(len(self.motion)))
+        """Rows of the log that the ends leave."""
+        own = self._inner(np.arange(len(self.motion))) * self.thinned
+        return self.origin[1][np.minimum(own, len(self.origin[1]) - 1)]
 
     def _inner(self, y: np.ndarray) -> np.ndarray:
         ends = round(ENDS / self.cutoff / self.period)
