@@ -21,6 +21,7 @@ from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays
 
 CHANCE = 1e-5  # of a finding on sound data, by each test
+NOTHING = 0.01  # chance of as much without any effect, above which a fit explains nothing
 SURE = 5.0  # deviations, of a trend: its spectrum is an estimate
 FOLLOWS = 0.1  # of what is left, that a trend must be to be told
 COMPUTED = 1e-6  # of the signal: what computed data leave, that have no noise
@@ -119,7 +120,7 @@ class _Quantity:
     def freedom(self) -> float:
         """Rows that count as independent, less what was fitted."""
         share = independent_share(np.concatenate([self.spectrum(s, s.left[s.used]) for s in self.series]))
-        return max(share * len(self.left) - self.jacobian.shape[1], 1.0)
+        return max(share * (len(self.left) - self.jacobian.shape[1]), 1.0)
 
     @cached_property
     def robust(self) -> np.ndarray:
@@ -208,7 +209,7 @@ def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
     k, whole, rest = one.jacobian.shape[1], float(measured @ measured), float(one.left @ one.left)
     gained = max(whole - rest, 0.0) / max(k, 1) / (rest / one.freedom)
     chance = float(fdtrc(k, one.freedom, gained)) if k else 1.0
-    if chance > CHANCE:
+    if chance > NOTHING:
         yield Fact("explains nothing", one.name, share=max(1 - rest / whole, 0.0), probability=chance)
 
 

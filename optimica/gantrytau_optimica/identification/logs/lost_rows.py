@@ -1,6 +1,8 @@
-"""Rows that a log has lost while its times go on evenly: positions go twice as far, or three times, from one row to the next.
+"""Rows that a log has lost while its times go on evenly: from one row to the next positions go twice as far.
 
-d = q_(k+1) - q_k,  m = (d_(k-1) + d_(k+1)) / 2,  r = d.m / m.m        all actuators in deviations of d - m
+d = q_(k+1) - q_k,  m: median of the two d before and the two behind,  r = d.m / m.m
+
+All actuators count in deviations of d - m; r is a whole number where rows are lost, and 1 elsewhere.
 """
 
 import numpy as np

@@ -83,8 +83,8 @@ class MotionLog(Record):
         result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
         the same for the same seed. Forces that jump, as those of sampled controllers do, are means over the period around
         each sample; of a run of `Rig` they are `measured.f`. Columns follow the inputs of the robot, lengths first; r is
-        that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
-        for a result with outputs farther apart than that.
+        that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a
+        period that is not above 0, and for a result with outputs farther apart than that.
         """
         if not (0 < period < np.inf and encoder >= 0 and force >= 0):
             raise ModelError(
