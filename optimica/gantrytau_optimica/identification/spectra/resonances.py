@@ -19,7 +19,8 @@ def resonances(
 
     y: (N,) or (N, k), whose powers are added, sampled every `period` s, from after the hit on. Means do not count. band:
     lowest and highest Hz; share: of the highest gain, by which a peak stands out at least. Peaks nearer than 1 / (N period)
-    Hz are one; start later to see what is damped least. Empty where nothing rings more than white noise does. Dressler (2012), Table 6.4.
+    Hz are one; start later to see what is damped least. Empty where nothing rings more than
+    white noise does. Dressler (2012), Table 6.4.
     Raises ModelError for what is too short or not finite, and for a band without frequencies.
     """
     from scipy.signal import find_peaks
