@@ -208,7 +208,7 @@ def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
         return
     k, whole, rest = one.jacobian.shape[1], float(measured @ measured), float(one.left @ one.left)
     gained = max(whole - rest, 0.0) / max(k, 1) / (rest / one.freedom)
-    chance = float(fdtrc(k, one.freedom, gained)) if k else 1.0
+    chance = float(fdtrc(k, one.freedom, gained)) if k else float(gained <= 0)
     if chance > NOTHING:
         yield Fact("explains nothing", one.name, share=max(1 - rest / whole, 0.0), probability=chance)
 

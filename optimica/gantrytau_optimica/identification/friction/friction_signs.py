@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gantrytau_optimica.fitting.diagnostics import COMPUTED
 from gantrytau_optimica.fitting.facts import Fact
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
@@ -113,7 +114,7 @@ def _known_mass(actuators: Sequence[ActuatorRows], fit: FrictionFit, mass: float
     change = sum(float(x @ left) for x, left in zip(own, fit.residuals, strict=True)) / size
     rest = [left - change * x for x, left in zip(own, fit.residuals, strict=True)]
     deviation = float(np.sqrt(sum(float(e @ e) for e in rest) / spare / size))
-    if not abs(change) > SURE * deviation:
+    if not abs(change) > max(SURE * deviation, COMPUTED * abs(fit.mass)):
         return []
     fact = Fact("fixed", "mass", held=fit.mass, wanted=fit.mass + change, deviations=abs(change) / deviation)
     remedy = "friction takes what is wrong with it: take mass='positions', or weigh what the actuators carry"
@@ -128,7 +129,7 @@ def _negative(
     for a, values, name in zip(actuators, fit.values, names, strict=True):
         deviations = np.sqrt(np.diag(fit.covariance)[begin : begin + values.size])
         begin += values.size
-        low = values < -SURE * deviations
+        low = values < -np.maximum(SURE * deviations, COMPUTED * np.max(np.abs(values), initial=0.0))
         if np.any(low):
             words = (
                 f"friction of {name} is below zero, {', '.join(f'{x:.3g}' for x in values[low])}: it would drive; look at "
