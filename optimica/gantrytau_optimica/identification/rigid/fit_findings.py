@@ -21,8 +21,8 @@ WORSE = 1.5  # times what a fit leaves where it was made, above which held-out r
 
 def usable_parts(
     logs: Sequence[MotionLog], cutoff: float
-) -> tuple[list[tuple[tuple[int, int], MotionLog]], list[Finding]]:
-    """Stretches without gaps that a filter can pass, with number of log and first row, and what was left out.
+) -> tuple[list[tuple[tuple[int, np.ndarray], MotionLog]], list[Finding]]:
+    """Stretches without gaps that a filter can pass, with number of log and rows there, and what was left out.
 
     Raises IdentificationError where nothing is left.
     """

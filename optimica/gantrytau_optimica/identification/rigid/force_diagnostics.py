@@ -50,7 +50,7 @@ def force_diagnostics(
 def _pulls(names: Sequence[str], found: LimitedFit, rows: Sequence[LogRows], free: np.ndarray) -> list[Fact]:
     """Limits that data contradict: where each parameter would go if it alone were free of them."""
     factors, facts = factors_of(rows), []
-    for k in np.flatnonzero(found.active):
+    for k in np.flatnonzero(found.active).tolist():
         places = np.sort(np.append(free, k))
         p = found.p.copy()
         others = np.setdiff1d(np.arange(len(p)), places)

@@ -24,7 +24,7 @@ def test_a_sound_log_is_told_nothing():
         found = identify(axes.two(), axes.log(seed))
         assert kinds(found) == []
         assert np.abs(deviations_off(found)).max() < 4
-    assert min(found.diagnostics.explained.values()) > 0.99
+        assert min(found.diagnostics.explained.values()) > 0.99
 
 
 MISTAKES = {
