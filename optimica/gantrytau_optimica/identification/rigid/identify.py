@@ -13,6 +13,8 @@ from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.residuals.force_diagnostics import force_diagnostics
+from gantrytau_optimica.identification.residuals.position_noise import unbiased
 from gantrytau_optimica.identification.rigid.chosen_parameters import (
     asked_parameters,
     check_call,
@@ -26,11 +28,9 @@ from gantrytau_optimica.identification.rigid.fit_findings import (
     half_against_half,
     usable_parts,
 )
-from gantrytau_optimica.identification.rigid.force_diagnostics import force_diagnostics
 from gantrytau_optimica.identification.rigid.friction_columns import FrictionColumns, Law
 from gantrytau_optimica.identification.rigid.identification import Identification
 from gantrytau_optimica.identification.rigid.parallel_filter import filtered_motion
-from gantrytau_optimica.identification.rigid.position_noise import unbiased
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
 from gantrytau_optimica.identification.rigid.rigid_regression import RigidRegression, factors_of, minimum
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
@@ -84,8 +84,8 @@ def identify(
     findings += beside_robot(dae, coordinates, logs, findings)
     given = fixed_values(dae, fixed or {}, len(coordinates), friction)
     known = {n: v for n, v in given.items() if is_friction(n)}
-    rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
-    rigid |= dict.fromkeys(frictions(dae), 0.0) if friction else {}
+    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    rigid = held | (dict.fromkeys(frictions(dae), 0.0) if friction else {})
     problem = RigidRegression(
         RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given, friction), rigid),
         FrictionColumns(len(coordinates), friction, known) if friction else None,
@@ -102,19 +102,21 @@ def identify(
     found = clean.fit
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
     answer = _identified(problem, found, rows, robot, clean.errors)
-    answer = replace(answer, diagnostics=force_diagnostics(problem, found, rows, logs))
-    doubts = (
-        *clean.findings,
-        *held_findings,
-        *fit_findings(problem.names, found, answer.weak, nonlinear),
-        *second_looks(problem, found, rows, given),
-    )
-    explained = any(f.kind in CAUSES for f in doubts)
-    doubts += tuple(f for f in answer.diagnostics.findings if not (explained and f.kind in SIGNS))
-    noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
-    answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
-    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    left = force_diagnostics(problem, found, rows, logs)
+    doubts = [*clean.findings, *held_findings, *fit_findings(problem.names, found, answer.weak, nonlinear)]
+    doubts += second_looks(problem, found, rows, given)
+    answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, diagnostics=left)
+    answer = replace(answer, findings=_noticed(findings, doubts, left.findings))
     return replace(answer, model_values=held | dict(answer.model_values))
+
+
+def _noticed(
+    of_logs: Sequence[Finding], of_fit: Sequence[Finding], of_residuals: Sequence[Finding]
+) -> tuple[Finding, ...]:
+    """What is told: of a fit what the logs do not tell already, signs in what is left where no cause is known."""
+    explained = any(f.kind in CAUSES for f in of_fit)
+    more = (*of_fit, *(f for f in of_residuals if not (explained and f.kind in SIGNS)))
+    return (*of_logs, *(f for f in more if f.kind not in {one.kind for one in of_logs}))
 
 
 def _with_fall(
