@@ -1,7 +1,10 @@
-"""Fitted parameters: how sure they are, and what is left of the data."""
+"""Fitted parameters: how sure they are, and what is left of the data.
+
+cov p = (J'J)^-1 J' cov(e) J (J'J)^-1        cov(e) of each output and experiment by the spectrum of e, where e is no noise
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +16,15 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, told_twice
 from gantrytau_optimica.estimation.mesh_error import COARSE
 from gantrytau_optimica.estimation.weights import median_deviation
+from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
+from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 
+FEW = 3  # samples, of which rates are known
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
 COMPUTED = 1e-6  # of the data: residuals that no measurement leaves
+COLOURED = ("not white", "trend", "drift", "delay")  # facts of residuals that are no noise
+ROBUST = ("outliers", "group", "noise larger", "noise smaller")  # what a robust fit expects
+STRAYS = "look at them, leave them out, or take loss='robust'"
 ENDS = {
     "time": "raise max_time=",
     "lost": "raise elements=, or give guess= of the motion",
@@ -93,7 +102,21 @@ class ParameterFit(Record):
         _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
         root = right.T / singular / norms[:, None]
         shift = np.nan_to_num([self.mesh_shift[n] for n in self.names])
-        return root @ root.T * self._factor + np.outer(shift, shift)
+        inverse = root @ root.T
+        coloured = self.loss == "squares" and any(f.kind in COLOURED for f in self.diagnostics.facts)
+        told = inverse @ coloured_product(self._series) @ inverse if coloured else inverse * self._factor
+        return told + np.outer(shift, shift)
+
+    @cached_property
+    def _series(self) -> list[ResidualSeries]:
+        return output_series(self.experiments, self.errors, self.jacobian, self.scales, self.known)
+
+    @cached_property
+    def diagnostics(self) -> Diagnostics:
+        """What is left of each output: explained share, size against given deviations, whiteness, strays, trends."""
+        squares = self.loss == "squares"
+        found = diagnose(self._series, remedies={"outliers": STRAYS})
+        return replace(found, facts=tuple(f for f in found.facts if squares or f.kind not in ROBUST))
 
     @property
     def _factor(self) -> float:
@@ -183,12 +206,7 @@ class ParameterFit(Record):
             found.append(
                 "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them"
             )
-        if self.known and self.loss == "squares" and self.probability < 1e-3:
-            found.append(
-                f"the residuals are {np.sqrt(self.variance):.3g} times as large as the given deviations: these are too "
-                "small, or the model is wrong"
-            )
-        return (*found, *self._computed())
+        return (*found, *(f.message for f in self.diagnostics.findings), *self._computed())
 
     def _computed(self) -> list[str]:
         """Words for outputs without deviations that the model meets as closely as only computed values are met."""
@@ -236,3 +254,52 @@ class ParameterFit(Record):
         return "\n".join(
             [f"<{type(self).__name__} {self.name}: {words}>", *(f"Note: {one}" for one in self.warnings)]
         )
+
+
+def output_series(
+    experiments: Sequence[Experiment],
+    errors: np.ndarray,
+    jacobian: np.ndarray,
+    scales: np.ndarray,
+    known: bool,
+) -> list[ResidualSeries]:
+    """Series of the columns of all outputs, from model less measured (N,) in deviations `scales`, with slopes (N, k)."""
+    found, begin = [], 0
+    for experiment in experiments:
+        for name, samples in experiment.measured.items():
+            n, columns = samples.values.shape
+            for k in range(columns):
+                rows = slice(begin, begin + n)
+                left, size, begin = -errors[rows], scales[rows], begin + n
+                model = samples.values[:, k] / size - left
+                signals = {"1": 1 / size, "gain": model}
+                if not experiment.static and n >= FEW and np.all(np.diff(samples.times) > 0):
+                    signals |= {
+                        "time": samples.times / size,
+                        "rate": np.gradient(model * size, samples.times) / size,
+                    }
+                found.append(
+                    ResidualSeries(
+                        name if columns == 1 else f"{name} (column {k})",
+                        left,
+                        measured=samples.values[:, k] / size,
+                        noise=1.0 if known else None,
+                        jacobian=jacobian[rows],
+                        signals=signals,
+                        groups={"experiment": np.full(n, experiment.name)},
+                        run=experiment.name,
+                    )
+                )
+    return found
+
+
+def coloured_product(series: Sequence[ResidualSeries]) -> np.ndarray:
+    """J' cov(e) J, (k, k), each series with its own spectrum; parameters have taken their share of what was there."""
+    spectra = [averaged_spectrum(one.left) for one in series]
+    pairs = [(one.jacobian, spectrum) for one, spectrum in zip(series, spectra, strict=True)]
+    independent = sum(
+        independent_share(spectrum) * len(one.left) for one, spectrum in zip(series, spectra, strict=True)
+    )
+    total = sum(product_covariance(J, spectrum) for J, spectrum in pairs if J is not None)
+    k = np.shape(total)[0]
+    return np.asarray(total) * independent / max(independent - k, 1.0)

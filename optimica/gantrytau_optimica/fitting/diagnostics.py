@@ -21,9 +21,11 @@ from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays
 
 CHANCE = 1e-5  # of a finding on sound data, by each test
+NOTHING = 0.01  # chance of as much without any effect, above which a fit explains nothing
 SURE = 5.0  # deviations, of a trend: its spectrum is an estimate
 FOLLOWS = 0.1  # of what is left, that a trend must be to be told
 COMPUTED = 1e-6  # of the signal: what computed data leave, that have no noise
+ALIKE = ("explains nothing", "not white")  # facts that quantities have together
 FEW = 8  # rows, below which nothing is asked
 CLIPPED = 5.0  # robust deviations: a single stray is no group
 
@@ -36,7 +38,7 @@ class ResidualSeries:
     what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: slopes of the model by what was
     fitted (N, k); signals: known ones (N,) that it may follow, "q of x", "v of x", "a of x", "sign v of x", "1", "time" in
     s, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run", "sensor"; rows: their numbers
-    in the data; band: share of the frequencies that a filter has left.
+    in the data; run: its name, where there are several; band: share of the frequencies that a filter has left.
     """
 
     name: str
@@ -47,6 +49,7 @@ class ResidualSeries:
     signals: Mapping[str, np.ndarray] = field(default_factory=dict)
     groups: Mapping[str, np.ndarray] = field(default_factory=dict)
     rows: np.ndarray | None = None
+    run: str = ""
     band: float = 1.0
 
     @cached_property
@@ -82,8 +85,15 @@ class Diagnostics(Record):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The facts in words, the likeliest causes first."""
-        return tuple(fact.finding for fact in self.facts)
+        """The facts in words, the likeliest causes first; what all quantities have alike is told once."""
+        told: dict[str, Fact] = {}
+        for k, fact in enumerate(self.facts):
+            key = fact.kind if fact.kind in ALIKE else f"{fact.kind} {k}"
+            before = told.get(key)
+            told[key] = (
+                fact if before is None else replace(before, quantity=f"{before.quantity}, {fact.quantity}")
+            )
+        return tuple(fact.finding for fact in told.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +120,7 @@ class _Quantity:
     def freedom(self) -> float:
         """Rows that count as independent, less what was fitted."""
         share = independent_share(np.concatenate([self.spectrum(s, s.left[s.used]) for s in self.series]))
-        return max(share * len(self.left) - self.jacobian.shape[1], 1.0)
+        return max(share * (len(self.left) - self.jacobian.shape[1]), 1.0)
 
     @cached_property
     def robust(self) -> np.ndarray:
@@ -194,12 +204,12 @@ def repeated(courses: Mapping[str, np.ndarray]) -> list[Fact]:
 def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
     from scipy.special import fdtrc
 
-    k = one.jacobian.shape[1]
-    if measured is None or not k:
+    if measured is None or all(s.jacobian is None for s in one.series):
         return
-    whole, rest = float(measured @ measured), float(one.left @ one.left)
-    chance = float(fdtrc(k, one.freedom, max(whole - rest, 0.0) / k / (rest / one.freedom)))
-    if chance > CHANCE:
+    k, whole, rest = one.jacobian.shape[1], float(measured @ measured), float(one.left @ one.left)
+    gained = max(whole - rest, 0.0) / max(k, 1) / (rest / one.freedom)
+    chance = float(fdtrc(k, one.freedom, gained)) if k else float(gained <= 0)
+    if chance > NOTHING:
         yield Fact("explains nothing", one.name, share=max(1 - rest / whole, 0.0), probability=chance)
 
 
@@ -231,11 +241,12 @@ def _of_order(
     elif correlation > least:
         yield Fact("not white", one.name, correlation, held=least)
     else:
-        far = np.abs(one.robust) / max(one.scale, 1e-300)
-        rows = np.concatenate([s.numbers for s in one.series])
-        strays = far > limit(len(far) - one.jacobian.shape[1])
-        if strays.any() and one.scale > 0:
-            yield Fact("outliers", one.name, float(far.max()), rows[strays])
+        most = limit(len(one.left) - one.jacobian.shape[1])
+        for s in one.series if one.scale > 0 else ():
+            far = np.abs(one.robust[one.of(s)]) / one.scale
+            if np.any(far > most):
+                name = f"{one.name} of {s.run}" if len(one.series) > 1 and s.run else one.name
+                yield Fact("outliers", name, float(far.max()), s.numbers[far > most])
 
 
 def _correlation(one: _Quantity) -> tuple[float, float]:
@@ -243,7 +254,7 @@ def _correlation(one: _Quantity) -> tuple[float, float]:
     most = CLIPPED * max(robust_deviation(one.left), 1e-300)
     product = square = pairs = 0.0
     for s in one.series:
-        step = max(1, round(1 / s.band))
+        step = max(1, int(np.ceil(1 / s.band - 1e-9)))
         for begin in range(step):
             e = np.clip(s.left[begin::step], -most, most)
             both = np.isfinite(e[1:]) & np.isfinite(e[:-1])

@@ -12,6 +12,7 @@ CAUSES = {  # what a remainder follows -> likeliest causes
     "v": "viscous friction",
     "a": "a mass",
     "sign v": "Coulomb friction",
+    "gain": "another scale of what was measured",
     "1": "a weight, or an offset of what was measured",
     "time": "it warms up, settles or gives way; wait until it stands, and measure again",
 }

@@ -12,7 +12,7 @@ from gantrytau.errors import StructureError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.learning.pose_maps import PoseMap, StraightAxes
-from gantrytau_optimica.learning.readings import with_readings
+from gantrytau_optimica.learning.readings import period_means, with_readings
 from gantrytau_optimica.learning.scatter import STILL, Scatter
 from gantrytau_optimica.learning.servo_loop import drive, servo_loop, unit_of
 
@@ -84,10 +84,11 @@ class Rig:
         of `push`, a force (N, 3) in N on the tool, resolved in the world, as of a hammer. The result
         has N rows, at these times: joints, forces and friction by their names in the robot, `tool.r`, `gauge.r` and
         `accelerometer.a` where it has them, `q_ref` and `v_ref`; readings with noise are `measured.q`, `measured.r` (of
-        the gauge, else of the tool) and `measured.a`, the mean over a period around each sample: forces that change with
-        the clock shake a robot at multiples of it, which single values would take for slow motion. Equal seeds draw the
-        same friction and noise: take another for each run. Raises ModelError for references of another shape or not
-        finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation stops.
+        the gauge, else of the tool), `measured.f` and `measured.a`, the means over a period around each sample: forces
+        that change with the clock shake a robot at multiples of it, which single values would take for slow motion. Equal
+        seeds draw the same friction and noise: take another for each run. Raises ModelError for references of another
+        shape or not finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation
+        stops.
         """
         q_ref = self._reference("position", position)
         v_ref = np.zeros_like(q_ref) if velocity is None else self._reference("velocity", velocity)
@@ -125,7 +126,10 @@ class Rig:
         units = {name.removeprefix("robot."): found.unit(name) for name in names}
         ends = np.searchsorted(found.time, t + (0.5 + 1e-6) * self.period, side="right") - 1
         sensed = [np.diff(found[name][ends], axis=0, prepend=0.0) / self.period for name in self._sensed]
-        return self._with_readings(t, values, units, sensed, random)
+        before = np.searchsorted(found.time, t - 1e-6 * self.period)
+        forces = [found[f"robot.{drive(joint)[2]}"] for joint in self.joints]
+        means = np.column_stack([period_means(f[before], f[rows], f[ends]) for f in forces])
+        return self._with_readings(t, values, units, sensed, means, random)
 
     @property
     def kinematics(self) -> PoseMap:
@@ -259,6 +263,7 @@ class Rig:
         values: dict[str, np.ndarray],
         units: dict[str, str],
         sensed: list[np.ndarray],
+        forces: np.ndarray,
         random: np.random.Generator,
     ) -> Result:
         true = {"q": np.column_stack([values[joint] for joint in self.joints])}
@@ -267,5 +272,6 @@ class Rig:
             true["r"] = np.column_stack([values[f"{place}[{k}]"] for k in range(3)])
         if sensed:
             true["a"] = sensed[0]
+        true["f"] = forces
         run = Result(t, values, units=units, title=f"{self.robot.name} under its servos")
         return with_readings(run, true, unit_of(self.joints), self.noise, random)

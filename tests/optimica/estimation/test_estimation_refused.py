@@ -103,7 +103,7 @@ def test_strong_correlation_is_told():
 
 def test_deviations_that_are_too_small_are_told():
     fit = estimate(Decay, {"k": 1.0}, Experiment({"y": Samples(TIMES, FADING, deviation=1e-3)}))
-    assert "times as large as the given deviations" in fit.warnings[-1]
+    assert "times the noise that was told" in fit.warnings[-1]
 
 
 @pytest.mark.parametrize(

@@ -222,6 +222,19 @@ def test_a_mass_that_falls_upwards_is_told():
     )
 
 
+def test_a_known_mass_that_runs_contradict_and_runs_that_come_twice_are_told():
+    logs = runs(poses(), *TABLE_6_1, np.random.default_rng(0), ripple=2.0)
+    assert "fixed" not in kinds(identify_friction(ROBOT, logs, mass=MASS))
+    wrong = {f.kind: f.message for f in identify_friction(ROBOT, logs, mass=3 * MASS).findings}
+    assert "mass is fixed at 67.14, data want 22." in wrong["fixed"]
+    assert "it would drive" in wrong["friction below zero"]
+    assert "run 0 and run" in next(
+        f.message
+        for f in identify_friction(ROBOT, [*logs, logs[0]], mass=MASS).findings
+        if f.kind == "duplicates"
+    )
+
+
 def test_missing_and_unsteady_runs_are_told():
     all_runs = runs(poses(), *TABLE_6_1)
     forth = [run for run in all_runs if run.q[-1, 0] > run.q[0, 0]]

@@ -9,6 +9,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
@@ -25,7 +26,8 @@ class Friction(Record):
     mass: in kg, of the plate with half of its links; deviation 0 where it was given. coulomb, viscous: (n, 2) in N and kg/s
     (N.m and N.m.s/rad of turning actuators), at positive and at negative speed, NaN where there were no runs.
     symmetric: mass in kg that makes Coulomb friction most symmetric, by norm ("least squares", "log ratio"): how far
-    they lie apart says what the assumption is worth. runs: means of the runs that were taken.
+    they lie apart says what the assumption is worth. runs: means of the runs that were taken; diagnostics: what is left
+    of them.
     """
 
     mass: float
@@ -37,6 +39,7 @@ class Friction(Record):
     load: CarriedMass
     names: tuple[str, ...] = field(default=())
     matrix: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    diagnostics: Diagnostics | None = field(default=None, repr=False)
 
     def covariance(self, names: Sequence[str] | None = None) -> np.ndarray:
         """Covariance (k, k) of `mass`, `coulomb[i][d]` and `viscous[i][d]`; None for all `names`.

@@ -1,12 +1,15 @@
 """What runs show that the law of Coulomb and viscous friction does not have, and what is missing among them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from gantrytau_optimica.fitting.diagnostics import COMPUTED
+from gantrytau_optimica.fitting.facts import Fact
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
-from gantrytau_optimica.identification.friction.friction_fit import ActuatorRows, FrictionFit
+from gantrytau_optimica.identification.friction.friction_fit import SEPARATED, ActuatorRows, FrictionFit
 
 SURE = 4.0  # deviations of what is told as seen
 FALLEN = 3.0  # Stribeck speeds, from which a ten-thousandth of the rise is left
@@ -25,7 +28,8 @@ def friction_signs(
     found = []
     for a, left, name in zip(actuators, fit.residuals, names, strict=True):
         found += [*_missing(a, runs, name), *_stribeck(a, runs, left, name), *_load(a, fit, left, name)]
-    return (*found, *_one_position(actuators, runs, mass), *_lifted(fit, mass))
+    told = (*_known_mass(actuators, fit, mass), *_negative(actuators, fit, names, runs))
+    return (*told, *found, *_one_position(actuators, runs, mass), *_lifted(fit, mass))
 
 
 def _missing(a: ActuatorRows, runs: ConstantRuns, name: str) -> list[Finding]:
@@ -97,6 +101,42 @@ def _one_position(actuators: Sequence[ActuatorRows], runs: ConstantRuns, mass: f
         "mass='positions'"
     )
     return [Finding("one position", runs.runs, words)]
+
+
+def _known_mass(actuators: Sequence[ActuatorRows], fit: FrictionFit, mass: float | str) -> list[Finding]:
+    """A mass that was told and that runs at several positions contradict."""
+    own = [a.beside(a.slope) for a in actuators]
+    size = sum(float(x @ x) for x in own)
+    seen = SEPARATED**2 * sum(float(a.slope @ a.slope) for a in actuators)
+    spare = sum(a.y.size - a.X.shape[1] for a in actuators) - 1
+    if isinstance(mass, str) or not size > seen or spare < 1:
+        return []
+    change = sum(float(x @ left) for x, left in zip(own, fit.residuals, strict=True)) / size
+    rest = [left - change * x for x, left in zip(own, fit.residuals, strict=True)]
+    deviation = float(np.sqrt(sum(float(e @ e) for e in rest) / spare / size))
+    if not abs(change) > max(SURE * deviation, COMPUTED * abs(fit.mass)):
+        return []
+    fact = Fact("fixed", "mass", held=fit.mass, wanted=fit.mass + change, deviations=abs(change) / deviation)
+    remedy = "friction takes what is wrong with it: take mass='positions', or weigh what the actuators carry"
+    return [replace(fact, remedy=remedy).finding]
+
+
+def _negative(
+    actuators: Sequence[ActuatorRows], fit: FrictionFit, names: Sequence[str], runs: ConstantRuns
+) -> list[Finding]:
+    """Friction that drives: a weight, an offset or a sign that is wrong."""
+    found, begin = [], 1
+    for a, values, name in zip(actuators, fit.values, names, strict=True):
+        deviations = np.sqrt(np.diag(fit.covariance)[begin : begin + values.size])
+        begin += values.size
+        low = values < -np.maximum(SURE * deviations, COMPUTED * np.max(np.abs(values), initial=0.0))
+        if np.any(low):
+            words = (
+                f"friction of {name} is below zero, {', '.join(f'{x:.3g}' for x in values[low])}: it would drive; look at "
+                "the mass, the sign of the forces and their offset"
+            )
+            found.append(Finding("friction below zero", runs.runs[a.rows], words))
+    return found
 
 
 def _lifted(fit: FrictionFit, mass: float | str) -> list[Finding]:

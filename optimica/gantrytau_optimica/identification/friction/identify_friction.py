@@ -6,12 +6,20 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose, repeated
 from gantrytau_optimica.identification.friction.carried_mass import carried_mass
-from gantrytau_optimica.identification.friction.constant_runs import constant_runs
-from gantrytau_optimica.identification.friction.friction_fit import ActuatorRows, actuator_rows, fit_friction
+from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns, constant_runs
+from gantrytau_optimica.identification.friction.friction_fit import (
+    ActuatorRows,
+    FrictionFit,
+    actuator_rows,
+    fit_friction,
+)
 from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.friction_signs import friction_signs
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+
+SIGNS = ("not white", "outliers", "trend")  # told where no cause is
 
 
 def identify_friction(
@@ -42,9 +50,34 @@ def identify_friction(
     fit = fit_friction(actuators, mass, load.actuators)
     coulomb, viscous, names = _by_direction(actuators, fit.values)
     signs = friction_signs(actuators, means, fit, load.actuators, mass)
+    left = _diagnostics(actuators, fit, means, load.actuators, runs)
+    causes = {f.kind for f in signs} - {"one position", "direction missing"}
+    noticed = (*unsteady, *signs, *(f for f in left.findings if not (causes and f.kind in SIGNS)))
     return Friction(
-        fit.mass, coulomb, viscous, fit.symmetric, (*unsteady, *signs), means, load, names, fit.covariance
+        fit.mass, coulomb, viscous, fit.symmetric, noticed, means, load, names, fit.covariance, left
     )
+
+
+def _diagnostics(
+    actuators: Sequence[ActuatorRows],
+    fit: FrictionFit,
+    means: ConstantRuns,
+    names: Sequence[str],
+    runs: Sequence[MotionLog],
+) -> Diagnostics:
+    """What is left of the means of runs, in their order, with their positions as known signals."""
+    series = [
+        ResidualSeries(
+            f"the force at {name}",
+            left,
+            measured=a.y,
+            jacobian=np.column_stack([a.X, a.slope]),
+            signals={f"q of {name}": means.q[a.rows, i], "order of runs": means.runs[a.rows].astype(float)},
+            rows=means.runs[a.rows],
+        )
+        for i, (a, left, name) in enumerate(zip(actuators, fit.residuals, names, strict=True))
+    ]
+    return diagnose(series, known=repeated({f"run {k}": np.hstack([r.q, r.f]) for k, r in enumerate(runs)}))
 
 
 def _by_direction(

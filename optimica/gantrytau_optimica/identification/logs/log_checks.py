@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.identification.logs.lost_rows import lost_rows
 from gantrytau_optimica.identification.logs.plain_friction import PlainFits, plain_fits
 
 GAP = 1.5  # median periods: what is longer lacks a sample
@@ -22,6 +23,7 @@ def check_log(t: np.ndarray, q: np.ndarray, f: np.ndarray, finite: np.ndarray) -
     return (
         *_not_finite(finite),
         *_times(t, finite),
+        *_lost(t, q, finite),
         *_units(q, finite),
         *_saturated(f, finite),
         *_motion(*_stretch(t, q, f, finite)),
@@ -58,6 +60,19 @@ def _times(t: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
             after,
             f"{rows_in_words(after)} {agreeing(after, 'follow')} a gap, up to {longest:.3g} s, of samples every "
             f"{period:.3g} s; the log is parted there, as slopes across gaps would be wrong",
+        )
+
+
+def _lost(t: np.ndarray, q: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
+    kept = np.flatnonzero(finite)
+    rows = kept[lost_rows(t[kept], q[kept]) > 0]
+    if rows.size:
+        it = "them" if len(rows) > 1 else "it"
+        yield Finding(
+            "lost rows",
+            rows,
+            f"positions go twice as far before {rows_in_words(rows)} as beside {it}, while times go on "
+            "evenly: rows are lost there, and all times behind are early; write down the time of each sample",
         )
 
 

@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
+from gantrytau_optimica.identification.logs.lost_rows import lost_rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,9 +81,10 @@ class MotionLog(Record):
         """The log that a simulated motion would give: samples every `period` s, with white noise.
 
         result: of `simulate(robot, ...)`; encoder, force: standard deviations in m (rad) and N (N.m); seed: of the noise,
-        the same for the same seed. Columns follow the inputs of the robot, lengths first; r is that of `tool.r` if there is
-        one, without noise. Raises ModelError for a robot without driven coordinates, for a period that is not above 0, and
-        for a result with outputs farther apart than that.
+        the same for the same seed. Forces that jump, as those of sampled controllers do, are means over the period around
+        each sample; of a run of `Rig` they are `measured.f`. Columns follow the inputs of the robot, lengths first; r is
+        that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a
+        period that is not above 0, and for a result with outputs farther apart than that.
         """
         if not (0 < period < np.inf and encoder >= 0 and force >= 0):
             raise ModelError(
@@ -92,7 +94,13 @@ class MotionLog(Record):
         joints = driven_joints(robot if isinstance(robot, Dae) else translate(robot, units=False))
         drives = [f"{name[:-2]}.f" if name.endswith(".s") else f"{name[:-4]}.tau" for name in joints]
         t = instants(result, 1 / period)
-        q, f = (np.column_stack([result.at(t, name) for name in names]) for names in (joints, drives))
+        q = np.column_stack([result.at(t, name) for name in joints])
+        if "measured.f" in result.arrays:
+            f = result.at(t, "measured.f")
+        elif np.any(np.diff(result.time) == 0):
+            f = np.column_stack([_means(result, name, t, period) for name in drives])
+        else:
+            f = np.column_stack([result.at(t, name) for name in drives])
         noise = np.random.default_rng(seed).normal(size=(2, *q.shape))
         r = result.at(t, "tool.r") if "tool.r" in result.arrays else None
         return cls(t, q + encoder * noise[0], f + force * noise[1], r=r)
@@ -134,10 +142,25 @@ class MotionLog(Record):
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "millimetres", "saturated force",
-        "slow", "constant velocity", "delay", "sign of force".
+        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "lost rows", "millimetres",
+        "saturated force", "slow", "constant velocity", "delay", "sign of force".
         """
         return check_log(self.t, self.q, self.f, self.finite)
+
+    def without_lost_rows(self) -> tuple[Self, np.ndarray]:
+        """The log with rows that were lost between others put in by cubic splines, without v and r; and for each of its rows
+        the number of the row here that is the next.
+        """
+        rows = np.arange(len(self))
+        lost = lost_rows(self.t, self.q) if np.all(self.finite) else np.zeros(len(self), dtype=int)
+        if not lost.any():
+            return self, rows
+        from scipy.interpolate import make_interp_spline
+
+        places = rows + np.cumsum(lost)
+        whole = np.arange(places[-1] + 1)
+        q, f = (make_interp_spline(places, x, k=3)(whole) for x in (self.q, self.f))
+        return type(self)(self.t[0] + self.period * whole, q, f), np.searchsorted(places, whole)
 
     def parts(self) -> tuple[Self, ...]:
         """The stretches between gaps, times that do not rise, and rows without numbers: to be differentiated one by one."""
@@ -152,6 +175,23 @@ class MotionLog(Record):
         )
         ends = np.flatnonzero(np.logical_or(np.diff(kept) > 1, crossed)) + 1
         return tuple(self[rows] for rows in np.split(kept, ends) if rows.size)
+
+
+def _means(result: Result, name: str, t: np.ndarray, period: float) -> np.ndarray:
+    """Means of a variable around each time (N,), as its impulses on both sides, a period long, move sampled positions."""
+    time, values = result.time, result[name]
+    slopes = np.diff(values) / np.where(np.diff(time) > 0, np.diff(time), np.inf)
+    impulse = np.append(0.0, np.cumsum(np.diff(time) * (values[1:] + values[:-1]) / 2))
+    steps = np.diff(time)
+    moved = np.append(0.0, np.cumsum(steps * impulse[:-1] + steps**2 * (2 * values[:-1] + values[1:]) / 6))
+
+    def at(when: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(time, when, side="right") - 1, 0, len(time) - 2)
+        x = when - time[k]
+        return moved[k] + x * impulse[k] + x**2 * values[k] / 2 + x**3 * slopes[k] / 6
+
+    inner = np.clip(t, time[0] + period, time[-1] - period)  # at both ends those of the neighbours
+    return (at(inner + period) - 2 * at(inner) + at(inner - period)) / period**2
 
 
 def join(logs: Sequence[MotionLog]) -> MotionLog:

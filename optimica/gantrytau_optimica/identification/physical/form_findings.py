@@ -7,6 +7,7 @@ import numpy as np
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
+from gantrytau_optimica.identification.physical.output_coordinates import POSITION, speed_jump
 
 APART = 0.2  # of M and of K by norm, by which two routes may differ
 MISSED = 0.1  # of the response by norm, that M, D and K may leave
@@ -23,14 +24,26 @@ def form_findings(
     system: LinearSystem,
     continuous: LinearSystem,
 ) -> tuple[Finding, ...]:
-    """Kinds "indefinite", "not symmetric", "disagreement", "fit", "aliased"."""
+    """Kinds "modes", "indefinite", "not symmetric", "disagreement", "fit", "aliased"."""
     told = (
+        *_modes(continuous),
         *_indefinite(form, direct),
         *_apart(form, direct),
         *_unexplained(missed),
         *_aliased(system, continuous),
     )
     return tuple(Finding(kind, NONE, words) for kind, words in told)
+
+
+def _modes(continuous: LinearSystem) -> Iterator[tuple[str, str]]:
+    if speed_jump(continuous) > POSITION:
+        order = len(continuous.A)
+        yield (
+            "modes",
+            f"a model of order {order} whose positions jump in speed with a force (|C B| w / |C A B| = "
+            f"{speed_jump(continuous):.2g}) stands for more modes than {order // 2}: the direct route is far off; identify "
+            "a higher order with a position for each mode, or hold only the fit for true, up to its modes",
+        )
 
 
 def _indefinite(form: MechanicalForm, direct: MechanicalForm) -> Iterator[tuple[str, str]]:

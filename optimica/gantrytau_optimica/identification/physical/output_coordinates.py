@@ -10,6 +10,7 @@ from gantrytau_optimica.identification.physical.mechanical_form import Mechanica
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 POSITION = 0.5  # |C B| w / |C A B| at the fastest mode; 0 for positions, 1 / (2 zeta) for speeds
+STAYS = 0.1  # |C A^-1 B| w / |C B| of positions whose model lacks modes, at the least; 0 of speeds
 GROWS = 1e-6  # of the largest pole, beyond the edge of stability: double poles on it are off by 1e-8
 SEEN = 1e-10  # of the largest, singular values of [C; C A] in equal units below which a mode is not seen
 
@@ -42,6 +43,21 @@ def continuous_of(system: LinearSystem) -> LinearSystem:
     return system if system.period is None else system.continuous()
 
 
+def speed_jump(system: LinearSystem) -> float:
+    """How far outputs jump in speed with a force, |C B| w / |C A B| at the fastest mode w: 0 of positions."""
+    w = float(np.abs(np.linalg.eigvals(system.A)).max())
+    size = float(np.linalg.norm(system.C @ system.A @ system.B))
+    return float(np.linalg.norm(system.C @ system.B)) * w / size if size else np.inf
+
+
+def _gives_way(system: LinearSystem, w: float) -> bool:
+    """Whether outputs stay where a constant force has moved them, as positions do and speeds do not."""
+    if np.linalg.cond(system.A) > 1 / np.finfo(float).eps:
+        return False
+    stays = system.C @ np.linalg.solve(system.A, system.B)
+    return bool(np.linalg.norm(stays) * w > STAYS * np.linalg.norm(system.C @ system.B))
+
+
 def direct_form(name: str, system: LinearSystem) -> MechanicalForm:
     """M, D and K of a continuous system, neither symmetric nor definite by construction.
 
@@ -50,23 +66,22 @@ def direct_form(name: str, system: LinearSystem) -> MechanicalForm:
     A, B, C = system.A, system.B, system.C
     n = len(C)
     w = float(np.abs(np.linalg.eigvals(A)).max())
-    inverse_mass, first = C @ A @ B, C @ B
+    inverse_mass = C @ A @ B
     seen = np.linalg.svd(np.vstack([C, C @ A / w]) / np.linalg.norm(C), compute_uv=False) if w else [0.0]
     if not seen[-1] > SEEN * seen[0]:
         raise IdentificationError(
             f"{name}: found modes that the outputs do not show, expected {n} positions that tell all of order {2 * n}; "
             "measure at other places, or identify a model of lower order"
         )
-    speed = float(np.linalg.norm(first)) * w
     size = float(np.linalg.norm(inverse_mass))
     if not size or np.linalg.cond(inverse_mass) > 1 / np.finfo(float).eps:
         raise IdentificationError(
             f"{name}: found C A B = {inverse_mass.tolist()}, which has no inverse, expected that every force accelerates a "
             "position of its own; give forces and positions in independent directions"
         )
-    if speed > POSITION * size:
+    if speed_jump(system) > POSITION and not _gives_way(system, w):
         raise IdentificationError(
-            f"{name}: found outputs that jump in speed with a force (|C B| w / |C A B| = {speed / size:.2g} at "
+            f"{name}: found outputs that jump in speed with a force (|C B| w / |C A B| = {speed_jump(system):.2g} at "
             f"{w / (2 * np.pi):.3g} Hz), expected positions, for which it is 0; integrate speeds, and look for a delay "
             "between forces and positions"
         )

@@ -55,11 +55,15 @@ def is_friction(name: str) -> bool:
 
 
 def asked_parameters(
-    dae: Dae, parameters: Sequence[str] | str | None, given: Mapping[str, Any]
+    dae: Dae, parameters: Sequence[str] | str | None, given: Mapping[str, Any], friction: Law | None
 ) -> tuple[str, ...]:
-    """Public names of the robot's own parameters to be identified, without those that are fixed."""
+    """Public names of the robot's own parameters to be identified, without those that are fixed.
+
+    Where its own friction is kept, the parameters of that are among those by default.
+    """
     if parameters is None:
-        return tuple(n for n in candidates(dae) if n not in given)
+        own = candidates(dae) if friction else (*candidates(dae), *frictions(dae))
+        return tuple(n for n in own if n not in given)
     known = dict.fromkeys((*candidates(dae), *(public_name(dae, n) for n in dae.adjustable)))
     bodies = {body.path: body for body in bodies_of(dae)}
     wanted = [parameters] if isinstance(parameters, str) else list(parameters)
@@ -98,7 +102,8 @@ def _check_body(dae: Dae, body: BodyParameters, wanted: Sequence[str], given: Ma
 
 def fixed_values(dae: Dae, fixed: Mapping[str, Any], n: int, friction: Law | None) -> dict[str, Any]:
     """Values by scalar name; of frictions a number, or a pair at positive and at negative speed."""
-    own = tuple(dict.fromkeys(public_name(dae, p) for p in dae.adjustable if p not in frictions(dae)))
+    theirs = frictions(dae) if friction else ()  # zero beside the law that is identified
+    own = tuple(dict.fromkeys(public_name(dae, p) for p in dae.adjustable if p not in theirs))
     laws = [f"{word}[{i}]" for word in words(friction or "symmetric") for i in range(n)] if friction else []
     sides = [name + side for name in laws for side in SIDES] if friction == "asymmetric" else []
     found: dict[str, Any] = {}

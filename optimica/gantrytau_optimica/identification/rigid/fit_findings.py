@@ -19,18 +19,29 @@ PERIODS = 10  # of the cutoff, which a stretch must last to be filtered
 WORSE = 1.5  # times what a fit leaves where it was made, above which held-out rows contradict it
 
 
-def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionLog], list[Finding]]:
-    """Stretches without gaps that a filter can pass, and what was left out. IdentificationError where nothing is left."""
-    kept, findings = [], []
+def usable_parts(
+    logs: Sequence[MotionLog], cutoff: float
+) -> tuple[list[tuple[tuple[int, np.ndarray], MotionLog]], list[Finding]]:
+    """Stretches without gaps that a filter can pass, with number of log and rows there, and what was left out.
+
+    Raises IdentificationError where nothing is left.
+    """
+    kept: list[tuple[tuple[int, np.ndarray], MotionLog]] = []
+    findings: list[Finding] = []
     if not 0 < cutoff < np.inf:
         raise IdentificationError(
             f"identify: found cutoff={cutoff!r}, expected a frequency in Hz above 0", argument="cutoff"
         )
     for number, log in enumerate(logs):
-        parts = log.parts()
+        mended, rows = log.without_lost_rows()
+        parts = mended.parts()
         long = [p for p in parts if len(p) > 1 and (p.t[-1] - p.t[0]) * cutoff >= PERIODS]
-        kept += long
-        lost = len(log) - sum(map(len, long))
+        firsts = [int(np.flatnonzero(mended.t == part.t[0])[0]) for part in long]
+        kept += [
+            ((number, rows[first : first + len(part)]), part)
+            for first, part in zip(firsts, long, strict=True)
+        ]
+        lost = len(mended) - sum(map(len, long))
         if lost:
             bad = np.flatnonzero(~log.finite)
             why = (
@@ -39,13 +50,16 @@ def usable_parts(logs: Sequence[MotionLog], cutoff: float) -> tuple[list[MotionL
                 else "times have gaps or do not rise"
             )
             words = (
-                f"{lost} of {len(log)} rows of log {number} do not count: {why}; what is left are {len(long)} stretches of "
-                f"at least {PERIODS / cutoff:g} s"
+                f"{lost} of {len(mended)} rows of log {number} do not count: {why}; what is left are {len(long)} stretches "
+                f"of at least {PERIODS / cutoff:g} s"
             )
             findings.append(Finding("gaps", bad, words))
-        told = [f for f in log.findings if f.kind not in LEFT_OUT]
+        told = [f for f in log.findings if f.kind not in LEFT_OUT or (f.kind == "time" and not lost)]
         where = f"log {number}: " if len(logs) > 1 else ""
-        findings += [replace(f, message=f"{where}{f.message}") for f in told]
+        ends = "; here they are put in again" if mended is not log else ""
+        findings += [
+            replace(f, message=f"{where}{f.message}{ends if f.kind == 'lost rows' else ''}") for f in told
+        ]
     if not kept:
         raise IdentificationError(
             f"identify: no log lasts {PERIODS} periods of the cutoff of {cutoff:g} Hz, {PERIODS / cutoff:g} s, without gap; "

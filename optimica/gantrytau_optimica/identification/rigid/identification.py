@@ -14,6 +14,7 @@ from gantrytau import Model, ModelError
 from gantrytau.describing.pages import page, table
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
+from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.rigid.robot_dynamics import expanded
 
@@ -30,7 +31,7 @@ class Identification(Record):
     motion of this kind tells apart; nonlinear: those in which forces are not linear; model_values:
     what was found and what was fixed by names of the model, as `--set` has them;
     stribeck_speed: m/s, of friction "stribeck", deviations are those at it; held_out: rms of what a fit of the first half
-    leaves of the second, N.
+    leaves of the second, N; diagnostics: what is left of the forces, joint by joint.
     """
 
     robot_name: str
@@ -48,6 +49,7 @@ class Identification(Record):
     model_values: Mapping[str, float]
     held_out: float
     findings: tuple[Finding, ...]
+    diagnostics: Diagnostics = field(repr=False)
     nominal: Model | None = field(repr=False)
 
     def covariance(self, names: Iterable[str] | str) -> np.ndarray:

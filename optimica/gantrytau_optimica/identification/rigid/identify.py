@@ -8,10 +8,13 @@ import numpy as np
 
 from gantrytau import Model, translate
 from gantrytau.dae import Dae
+from gantrytau_optimica.fitting.diagnostics import diagnose
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit, fit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
+from gantrytau_optimica.identification.residuals.force_diagnostics import force_diagnostics
+from gantrytau_optimica.identification.residuals.position_noise import unbiased
 from gantrytau_optimica.identification.rigid.chosen_parameters import (
     asked_parameters,
     check_call,
@@ -38,6 +41,8 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 )
 
 FALLS = (0.01, 1.0)  # m/s between which a Stribeck speed is looked for
+CAUSES = ("delay", "law of friction", "fixed", "noise of positions")  # of what else is left
+SIGNS = ("not white", "outliers")  # told where no cause is
 INFLATED = (
     10.0  # times the deviation that a parameter would have alone: errors of the model weigh as much more
 )
@@ -59,10 +64,11 @@ def identify(
 
     robot: any model, or what `translate` made of it, of any loops, whose inputs are the forces or torques of its drives,
     with `s` or `phi` beside them; log: one or several, q and f in the order of these inputs. parameters: names or
-    families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces.
+    families, `plate_mass`, `link_masses[0]` or the model's own, by default masses and inertias that move the forces, and
+    the friction of the model (f_c, f_v, f_s) where it is kept.
     The name of a body, `tool`, stands for its ten: mass, `tool.moment[i]` in kg.m, `tool.inertia[i,j]` in kg.m2 about the
     origin of its frame. fixed: values by name or family, numbers, or pairs at positive and negative speed; link_masses=0
-    leaves links out. friction: the law that is identified in place of the model's, None keeps that; the speed of
+    leaves links out. friction: the law that is identified in place of the model's, None keeps that law; the speed of
     "stribeck" is one for all joints, looked for between 0.01 and 1. physical: no mass and no friction below the limits
     that the model declares, no body without a density (pseudo-inertia). cutoff: Hz, of the zero-phase filter of both
     sides; minimum_speed: m/s or rad/s, below which a joint's rows do not count; twice Stribeck's keeps that out of the
@@ -78,12 +84,12 @@ def identify(
     findings += beside_robot(dae, coordinates, logs, findings)
     given = fixed_values(dae, fixed or {}, len(coordinates), friction)
     known = {n: v for n, v in given.items() if is_friction(n)}
-    rigid = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
-    rigid |= dict.fromkeys(frictions(dae), 0.0) if friction else {}
+    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    rigid = held | (dict.fromkeys(frictions(dae), 0.0) if friction else {})
     problem = RigidRegression(
-        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given), rigid),
+        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given, friction), rigid),
         FrictionColumns(len(coordinates), friction, known) if friction else None,
-        [filtered_motion(part, cutoff) for part in parts],
+        [replace(filtered_motion(part, cutoff), origin=origin) for origin, part in parts],
         minimum_speed,
     )
     problem = problem if parameters else problem.without_silent()
@@ -92,17 +98,25 @@ def identify(
     if friction == "stribeck":
         problem = _with_fall(problem, limits, nonlinear)
     found, rows = minimum(problem, limits, nonlinear)
+    clean = unbiased(problem, found, rows, [part for _, part in parts])
+    found = clean.fit
     judged, held_findings = _judged(rows, problem, limits) if holdout else (np.nan, [])
-    answer = _identified(problem, found, rows, robot)
-    doubts = (
-        *held_findings,
-        *fit_findings(problem.names, found, answer.weak, nonlinear),
-        *second_looks(problem, found, rows, given),
-    )
-    noticed = (*findings, *(f for f in doubts if f.kind not in {one.kind for one in findings}))
-    answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, findings=noticed)
-    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    answer = _identified(problem, found, rows, robot, clean.errors)
+    left = force_diagnostics(problem, found, rows, logs)
+    doubts = [*clean.findings, *held_findings, *fit_findings(problem.names, found, answer.weak, nonlinear)]
+    doubts += second_looks(problem, found, rows, given)
+    answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, diagnostics=left)
+    answer = replace(answer, findings=_noticed(findings, doubts, left.findings))
     return replace(answer, model_values=held | dict(answer.model_values))
+
+
+def _noticed(
+    of_logs: Sequence[Finding], of_fit: Sequence[Finding], of_residuals: Sequence[Finding]
+) -> tuple[Finding, ...]:
+    """What is told: of a fit what the logs do not tell already, signs in what is left where no cause is known."""
+    explained = any(f.kind in CAUSES for f in of_fit)
+    more = (*of_fit, *(f for f in of_residuals if not (explained and f.kind in SIGNS)))
+    return (*of_logs, *(f for f in more if f.kind not in {one.kind for one in of_logs}))
 
 
 def _with_fall(
@@ -147,12 +161,12 @@ def _second(count: int) -> slice:
 
 
 def _identified(
-    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model | Dae
+    problem: RigidRegression, found: LimitedFit, rows: list[LogRows], robot: Model | Dae, errors: np.ndarray
 ) -> Identification:
-    """The record of a fit."""
+    """The record of a fit; errors: factor (k, k) of its errors beside those of least squares."""
     names, p = problem.names, found.p
     free = found.base.independent[~found.active[found.base.independent]]
-    matrix = covariance(rows, p, free)
+    matrix = errors @ covariance(rows, p, free) @ errors.T
     matrix[found.base.dependent, found.base.dependent] = np.nan
     deviations = np.sqrt(np.diag(matrix))
     told = (found.inflation <= INFLATED) & (2 * deviations <= np.abs(p))
@@ -190,5 +204,6 @@ def _identified(
         model_values=values,
         held_out=np.nan,
         findings=(),
+        diagnostics=diagnose(()),
         nominal=robot if isinstance(robot, Model) else None,
     )

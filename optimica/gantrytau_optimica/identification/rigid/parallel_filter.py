@@ -17,7 +17,7 @@ ORDER = 4
 WIDER = 4.0  # times the cutoff, of the filter before encoders are differentiated
 SAMPLES = 10.0  # kept for each period of the cutoff
 JITTER = 0.02  # of a period, by which steps of time may differ before they are made even
-ENDS = 0.5  # periods of the cutoff at either end, in which the filter knows one side only
+ENDS = 2.0  # periods of the cutoff at either end, in which the filter knows one side only
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,7 @@ class FilteredMotion:
 
     log_period: s, of the log, of whose rows each `thinned`th is kept; v, speed (all rows of the log, n): the second filtered
     by H, for the sign of friction and the dead zone. That sign jumps, so friction is filtered before it is thinned.
+    origin: number of the log, and of its rows.
     """
 
     log_period: float
@@ -35,6 +36,7 @@ class FilteredMotion:
     v: np.ndarray
     speed: np.ndarray
     f: np.ndarray
+    origin: tuple[int, np.ndarray] = (0, np.zeros(1, dtype=int))
 
     @property
     def period(self) -> float:
@@ -52,6 +54,12 @@ class FilteredMotion:
     def moving(self, minimum_speed: float) -> np.ndarray:
         """Where a joint is faster than the dead zone, (N, n), without the ends."""
         return self._inner(np.abs(self.speed[:: self.thinned]) >= minimum_speed)
+
+    @property
+    def inner(self) -> np.ndarray:
+        """Rows of the log that the ends leave."""
+        own = self._inner(np.arange(len(self.motion))) * self.thinned
+        return self.origin[1][np.minimum(own, len(self.origin[1]) - 1)]
 
     def _inner(self, y: np.ndarray) -> np.ndarray:
         ends = round(ENDS / self.cutoff / self.period)

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+
+from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, product_covariance
 
 BAND = 5.0  # parts of the cutoff over which the spectrum is averaged
 
@@ -49,24 +50,12 @@ def covariance(logs: Sequence[LogRows], p: np.ndarray, free: np.ndarray) -> np.n
         for i in range(left.shape[1]):
             x = np.where(rows.moving[:, i, None], rows.A[:, i, free], 0.0) / scale
             normal += x.T @ x
-            middle += _middle(x, left[:, i], rows, float(np.mean(rows.moving[:, i])))
+            if np.any(rows.moving[:, i]):
+                width = round(rows.cutoff / BAND * len(left) * rows.period)
+                spectrum = averaged_spectrum(left[:, i], width, float(np.mean(rows.moving[:, i])))
+                middle += product_covariance(x, spectrum)
     inverse = np.linalg.inv(normal)
     # parameters have taken their share of what was there to be left
     share = independent / max(independent - len(free), 1.0)
     found[np.ix_(free, free)] = share * (inverse @ middle @ inverse) / np.outer(scale, scale)
     return found
-
-
-def _middle(x: np.ndarray, left: np.ndarray, rows: LogRows, used: float) -> np.ndarray:
-    """The product x' cov(left) x for stationary noise, by its averaged spectrum."""
-    count = len(left)
-    if used == 0:
-        return np.zeros((x.shape[1],) * 2)
-    spectrum = np.abs(np.fft.rfft(left)) ** 2 / (count * used)
-    width = max(3, round(rows.cutoff / BAND * count * rows.period))
-    spectrum = uniform_filter1d(spectrum, width, mode="reflect")
-    seen = np.fft.rfft(x, axis=0)
-    twice = np.full(len(spectrum), 2.0)  # but the mean, and the last of an even count
-    twice[0] = 1.0
-    twice[-1] = 1.0 if count % 2 == 0 else 2.0
-    return np.real(np.conj(seen).T @ (seen * (twice * spectrum)[:, None])) / count

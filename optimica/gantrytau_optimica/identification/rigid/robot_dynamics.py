@@ -25,7 +25,7 @@ from gantrytau_optimica.identification.rigid.many_rows import LEAST, MOST, of_co
 BLOCK = 1024  # rows of one call, as many as caches hold
 PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records
 PLATE = ("plate_mass", "tool.m", "platform.m")  # what a robot calls its plate
-LAWS = re.compile(r"\.(f_c|f_v|f_s)(\[\d\])?$")  # as all laws of friction name their parameters
+LAWS = re.compile(r"(?:^|\.)(f_c|f_v|f_s)(\[\d\])?$")  # as all laws of friction name their parameters
 LINEAR = 1e-9  # of the largest slope of a parameter, by which rounding may change it
 
 
@@ -94,8 +94,8 @@ class RobotDynamics:
         """The component of symmetric friction beside each force, such as `carts[0].law`, None where there is none."""
         found = []
         for force in self.forces:
-            owner = force.rpartition(".")[0]
-            within = [n for n in frictions(self.dae) if n.startswith(f"{owner}.") and n.endswith(".f_c")]
+            owner = "".join(force.rpartition(".")[:2])
+            within = [n for n in frictions(self.dae) if n.startswith(owner) and n.endswith(".f_c")]
             found.append(within[0].removesuffix(".f_c") if len(within) == 1 else None)
         return tuple(found)
 
@@ -194,8 +194,8 @@ def drives(dae: Dae) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Driven coordinates and what drives them: the `s` or `phi` beside each input force or torque."""
     coordinates = []
     for force in dae.inputs:
-        owner = force.rpartition(".")[0]
-        beside = [f"{owner}.{n}" for n in ("s", "phi")]
+        owner = "".join(force.rpartition(".")[:2])  # with its dot; the model itself has none
+        beside = [f"{owner}{n}" for n in ("s", "phi")]
         found = next((n for n in beside if n in dae.variables), None)
         if found is None:
             raise ModelError(

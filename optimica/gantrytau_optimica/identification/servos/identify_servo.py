@@ -4,12 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose, repeated
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.servos.servo_findings import explained, servo_findings
 from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRows, fit_servo
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse, check_steps
 
+TOLD = (
+    "duplicates",
+    "outliers",
+    "group",
+)  # friction and limits of servos colour what is left, and are told by themselves
 FOLLOWS = 30.0  # % of the motion, below which positions do not follow references
 
 
@@ -34,6 +40,7 @@ def identify_servo(steps: StepResponse | Sequence[StepResponse]) -> ServoModel:
         _check_follows(i, share[i], fit)
         rest[[r.step for r in one], i] = fit.rest
         matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = fit.covariance
+    left = _diagnostics(steps, rows, fits)
     return ServoModel(
         np.array([fit.delay for fit in fits]),
         np.array([fit.pole for fit in fits]),
@@ -42,13 +49,36 @@ def identify_servo(steps: StepResponse | Sequence[StepResponse]) -> ServoModel:
         period,
         rest,
         steps,
-        tuple(
-            finding
-            for i, pair in enumerate(zip(rows, fits, strict=True))
-            for finding in servo_findings(i, *pair, period)
+        (
+            *(
+                finding
+                for i, pair in enumerate(zip(rows, fits, strict=True))
+                for finding in servo_findings(i, *pair, period)
+            ),
+            *(f for f in left.findings if f.kind in TOLD),
         ),
         matrix,
+        left,
     )
+
+
+def _diagnostics(
+    steps: Sequence[StepResponse], rows: Sequence[list[ServoRows]], fits: Sequence[ServoFit]
+) -> Diagnostics:
+    """What the laws leave of the motion of each actuator, step by step."""
+    series = [
+        ResidualSeries(
+            f"actuator {i}",
+            left,
+            measured=r.y - rest,
+            groups={f"actuator {i}, step": np.full(len(left), r.step)},
+            run=f"step {r.step}",
+        )
+        for i, (own, fit) in enumerate(zip(rows, fits, strict=True))
+        for r, left, rest in zip(own, fit.residuals, fit.rest, strict=True)
+    ]
+    courses = {f"step {k}": np.hstack([step.reference, step.position]) for k, step in enumerate(steps)}
+    return diagnose(series, known=repeated(courses))
 
 
 def _rows(steps: Sequence[StepResponse], i: int) -> list[ServoRows]:
@@ -62,8 +92,8 @@ def _rows(steps: Sequence[StepResponse], i: int) -> list[ServoRows]:
 def _check_follows(i: int, share: float, fit: ServoFit) -> None:
     if not share > FOLLOWS:
         raise IdentificationError(
-            f"identify_servo: found that the reference explains {max(share, 0.0):.0f} % of the motion of actuator {i}, "
-            f"expected {FOLLOWS:.0f} % at least; look at the order of columns and at the clocks of both (the best delay is "
+            f"identify_servo: found that the reference explains {max(share, 0.0):.3g} % of the motion of actuator {i}, "
+            f"expected more than {FOLLOWS:.0f} %; look at the order of columns and at the clocks of both (the best delay is "
             f"{fit.delay} samples)"
         )
     if fit.pole >= 1 - 1e-8:

@@ -10,6 +10,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.servos.figures import draw_steps
 from gantrytau_optimica.identification.servos.servo_fit import corner, response
@@ -25,6 +26,7 @@ class ServoModel(Record):
 
     delay: d in samples, (n,) of whole numbers; pole: a, (n,); gain: b, (n,); fit: % of the motion that is explained, (n,);
     period: in s. rest: position in m (rad) from which each step began, (steps, n), NaN where an actuator did not step.
+    diagnostics: what the laws leave.
     """
 
     delay: np.ndarray
@@ -36,6 +38,7 @@ class ServoModel(Record):
     steps: tuple[StepResponse, ...]
     findings: tuple[Finding, ...]
     matrix: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    diagnostics: Diagnostics | None = field(default=None, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from gantrytau.answers.linear_systems.linear_system import check_period
 
 FINER = 16  # points of the spectrum for each that the samples tell
 LEAST = 16  # samples
+CHANCE = 1e-5  # that noise alone has a peak
 ROUNDING = 1e-12  # of the values, below which there is no motion
 
 
@@ -18,7 +19,8 @@ def resonances(
 
     y: (N,) or (N, k), whose powers are added, sampled every `period` s, from after the hit on. Means do not count. band:
     lowest and highest Hz; share: of the highest gain, by which a peak stands out at least. Peaks nearer than 1 / (N period)
-    Hz are one; start later to see what is damped least. Empty where nothing rings. Dressler (2012), Table 6.4.
+    Hz are one; start later to see what is damped least. Empty where nothing rings more than
+    white noise does. Dressler (2012), Table 6.4.
     Raises ModelError for what is too short or not finite, and for a band without frequencies.
     """
     from scipy.signal import find_peaks
@@ -54,8 +56,23 @@ def resonances(
             argument="band",
         )
     peaks, _ = find_peaks(gain, prominence=share * gain[inside].max(), distance=FINER)
-    peaks = peaks[inside[peaks]]
+    peaks = peaks[inside[peaks] & (gain[peaks] ** 2 > _of_noise(moving))]
     # the summit of a parabola through three points of the logarithm
     left, top, right = (np.log(gain[peaks + k]) for k in (-1, 0, 1))
     summit = peaks + 0.5 * (left - right) / (left - 2 * top + right)
     return summit[np.argsort(-top)] * hertz[1]
+
+
+def _of_noise(y: np.ndarray) -> float:
+    """Power that a spectrum of white noise in y (N, k) does not reach by chance, from its lower quartile.
+
+    Powers of k columns are distributed as chi square of 2 k degrees of freedom; rings leave the quartile far below them.
+    """
+    from scipy.special import chdtri
+
+    power = np.sum(np.abs(np.fft.rfft(y, axis=0)[1:]) ** 2, axis=1)
+    freedom = 2 * y.shape[1]
+    # a finer spectrum has about twice as many independent summits
+    return float(
+        np.quantile(power, 0.25) / chdtri(freedom, 0.75) * chdtri(freedom, CHANCE / (2 * len(power)))
+    )

@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike
 from gantrytau import ModelError, StateSpace
 from gantrytau.answers.linear_systems.linear_system import check_period
 from gantrytau.results.figures import check_suffix, finished
+from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
-from gantrytau_optimica.identification.systems.linear_fit import followed, input_matrices
+from gantrytau_optimica.identification.systems.linear_fit import followed
+from gantrytau_optimica.identification.systems.other_systems import others_explain_more, system_of
 from gantrytau_optimica.identification.systems.subspace import SharedSpace, shared_space
 
 if TYPE_CHECKING:
@@ -29,7 +31,8 @@ class IdentifiedSystem(StateSpace):
     """A sampled linear system that was identified, about the means of its inputs and outputs.
 
     singular_values: canonical correlations of past and future, (k,) from 1 down, for orders up to k: an order ends at a
-    gap; those of noise alone stay below `noise`. findings: kinds "order", "unstable". It answers as any `StateSpace` does:
+    gap; those of noise alone stay below `noise`. findings: kinds "order", "unstable", "drift",
+    "outliers"; diagnostics: what is left of the outputs. It answers as any `StateSpace` does:
     poles, damping, `plot_bode`, a component of models.
     """
 
@@ -40,12 +43,14 @@ class IdentifiedSystem(StateSpace):
         singular_values: np.ndarray,
         noise: float,
         findings: tuple[Finding, ...],
+        diagnostics: Diagnostics,
         **modifications: Any,
     ):
         super().__init__(*matrices, period=period, **modifications)
         self.singular_values = singular_values
         self.noise = noise
         self.findings = findings
+        self.diagnostics = diagnostics
 
     @property
     def title(self) -> str:
@@ -109,18 +114,36 @@ def identify_system(
     normed_u, normed_y = ((x - x.mean(axis=0)) / size for x, size in zip((u, y), sizes, strict=True))
     space = shared_space(normed_u, normed_y, block_rows)
     _check_space(space, order, block_rows)
-    A, C = space.system(order)
+    A, B, C, D = best = system_of(space, order, normed_u, normed_y)
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if radius > 1 and len(u) * np.log(radius) > np.log(GROWN):
         raise IdentificationError(
             f"identify_system: found a pole with |z| = {radius:.6g}, whose motion would grow {len(u)} samples long, "
             "expected a system that comes to rest; take a lower order, more samples, or outputs that do not drift"
         )
-    B, D = input_matrices(A, C, normed_u, normed_y)
     matrices = (A, B / sizes[0], C * sizes[1][:, None], D * sizes[1][:, None] / sizes[0])
     noise = _of_noise(len(u), u.shape[1], y.shape[1], block_rows)
-    return IdentifiedSystem(
-        matrices, float(period), space.correlations, noise, tuple(_findings(space, order, noise, radius))
+    left = _diagnostics(y, followed(matrices, u, y), period)
+    found = (
+        *_findings(space, order, noise, radius),
+        *others_explain_more(best, space, noise, normed_u, normed_y, block_rows),
+        *(f for f in left.findings if f.kind != "not white"),  # noise of outputs may have any colour
+    )
+    return IdentifiedSystem(matrices, float(period), space.correlations, noise, found, left)
+
+
+def _diagnostics(y: np.ndarray, simulated: np.ndarray, period: float) -> Diagnostics:
+    """What is left of each output, simulated with its inputs."""
+    return diagnose(
+        [
+            ResidualSeries(
+                f"output {i}",
+                (y - simulated)[:, i],
+                measured=y[:, i] - np.mean(y[:, i]),
+                signals={"time": period * np.arange(len(y))},
+            )
+            for i in range(y.shape[1])
+        ]
     )
 
 

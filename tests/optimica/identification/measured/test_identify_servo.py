@@ -268,7 +268,7 @@ def test_what_is_no_step_response(arguments, words):
         (
             [StepResponse(T, JUMP, np.sin(300 * T))],
             IdentificationError,
-            "of the motion of actuator 0, expected 30 % at least",
+            "of the motion of actuator 0, expected more than 30 %",
         ),
         (
             [StepResponse(T, JUMP, np.cumsum(JUMP))],

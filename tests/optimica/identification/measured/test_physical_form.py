@@ -373,3 +373,13 @@ def test_words():
     form = physical_form(SYSTEM)
     assert repr(form).startswith("<PhysicalForm of 2 coordinates\n  M = [[10.5")
     assert "14.38 Hz, damping 0.0513" in repr(form.modes)
+
+
+def test_positions_of_a_model_that_lacks_modes_are_answered_and_told():
+    """They jump in speed with a force, as speeds do, but stay where a constant force has moved them."""
+    fastest = np.abs(SYSTEM.poles).max()
+    lacking = StateSpace(SYSTEM.A, SYSTEM.B, SYSTEM.C + SYSTEM.C @ SYSTEM.A / fastest)
+    found = physical_form(lacking.discrete(PERIOD))
+    assert found.findings[0].kind == "modes"
+    assert "a model of order 4" in found.findings[0].message
+    assert not found.indefinite

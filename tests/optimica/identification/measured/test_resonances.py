@@ -39,6 +39,15 @@ def test_what_stands_rings_at_no_frequency():
     assert resonances(np.full(100, 0.3), PERIOD).size == 0
 
 
+def test_white_noise_rings_at_no_frequency_and_a_ring_in_it_does():
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(size=(600, 1 + seed % 2))
+        assert resonances(noise, PERIOD).size == 0
+        found = resonances(noise[:, 0] + ring(11.5, 0.01, 3.0), PERIOD)
+        assert found[0] == pytest.approx(11.5, abs=0.3)
+        assert np.abs(found - 11.5).max() < 2  # beside it what noise makes of its flanks
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
