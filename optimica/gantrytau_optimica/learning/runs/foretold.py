@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.learning.laws.learning import Stability
 
 LEFT = 0.3  # of the corrections: noise and friction leave 0.03 to 0.1 on the flexible robot, another plant 0.4 and more

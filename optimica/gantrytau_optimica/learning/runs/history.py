@@ -13,7 +13,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
-from gantrytau_optimica.calibration.data.findings import Finding
+from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.learning.laws.learning import Stability
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
 from gantrytau_optimica.learning.runs.foretold import not_as_foretold
