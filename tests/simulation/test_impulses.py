@@ -212,12 +212,13 @@ def test_a_step_of_current_divides_by_the_inverse_inductances(fixed):
 class ChargedByVoltage(Model):
     """Two capacitors in series whose charges are q = v + v^3 and q = 2 v, on a source that steps."""
 
+    height = Parameter(3.0)
     v, u, i = Real(start=0.0, fixed=True), Real(), Real()
 
     def equations(self) -> Any:
         yield (1 + 3 * self.v**2) * der(self.v) == self.i
         yield 2 * der(self.u) == self.i
-        yield self.v + self.u == if_else(time > 1, 3.0, 0.0)
+        yield self.v + self.u == if_else(time > 1, self.height, 0.0)
 
 
 def test_charge_is_kept_where_the_capacity_changes_with_the_voltage():

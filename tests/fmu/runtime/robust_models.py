@@ -40,6 +40,7 @@ from gantrytau.mechanics.translational import Force, Mass, StickSlipFriction
 from gantrytau_fmu import export_fmu
 from gantrytau_models import FourBar, GantryTau, Pendulum, SixLinkGantryTau, prototypes
 from tests.fmu.binaries_kept import binary
+from tests.simulation.test_impulses import ChargedByVoltage
 
 DRIVERS = Path(__file__).parent / "c"
 
@@ -141,6 +142,7 @@ MAKERS = {
     "stiffly_juggled": lambda: (Juggled(), {"solver": "rodas4"}),
     "late": lambda: (Late(), {}),
     "stiffly_late": lambda: (Late(), {"solver": "rodas4"}),
+    "thrown": lambda: (ChargedByVoltage(), {}),
     "root": lambda: (Root(), {}),
     "lags": lambda: (Lags(), {}),
     # three equal sides and one that fits: a parallelogram, singular where it is flat

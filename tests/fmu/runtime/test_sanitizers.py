@@ -15,7 +15,8 @@ MODELS = (
     "stiffly_late",
     "stiffly_juggled",
     "late",
-)  # implicit blocks; friction and samples; whens; delays
+    "thrown",
+)  # implicit blocks; friction and samples; whens; delays; jumps of states
 
 
 @pytest.mark.parametrize("model", first_of(MODELS, 4))
