@@ -129,7 +129,10 @@ def _without_strays(group: Group, x: np.ndarray, weights: np.ndarray | None, noi
     rows = np.flatnonzero(sure > 0)[few]
     left = (group.errors(x)[rows] * sure[rows, None]).T.ravel()
     J = np.concatenate([group.slopes(x, k)[rows] * sure[rows, None] for k in range(len(group.chains))])
-    usual = robust_deviation(without_strays(left, J), int(np.linalg.matrix_rank(J)))
+    rank = int(np.linalg.matrix_rank(J))
+    if len(left) < 4 * rank:  # few errors do not show which of them are strays
+        return noise
+    usual = robust_deviation(without_strays(left, J), rank)
     return usual if STRAYS * usual < noise else noise
 
 

@@ -24,6 +24,7 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.link_systems import LinkSystem, link_systems
+from gantrytau_optimica.calibration.judging.order_effects import ENDS
 from gantrytau_optimica.calibration.judging.plausibility import Misses
 from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
@@ -67,9 +68,11 @@ class FittedRods(Record):
         )
 
     def without_strays(self) -> Self:
-        """The same by the rows that close as others do, for what is judged beside wrong ones."""
+        """The same by the rows that close as others do, for what is judged beside wrong ones; with all where these are so
+        many that they may have a cause.
+        """
         bad = self.suspicion.rows
-        if not bad.size or self.loss == "robust":
+        if not 0 < bad.size < ENDS or self.loss == "robust":
             return self
         rows, held_out = (np.setdiff1d(each, bad) for each in (self.rows, self.held_out))
         return replace(self, fits=self.suspicion.fits, rows=rows, held_out=held_out)
