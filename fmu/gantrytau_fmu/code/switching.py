@@ -14,10 +14,10 @@ from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.pattern import Pattern
 from gantrytau.compiler.system import System
 from gantrytau.compiler.translated import solved
-from gantrytau.language.instructions import computed
 from gantrytau.language.piecewise import Turn
 from gantrytau.simulation.events.margins import ROUNDING
 from gantrytau.simulation.events.modes import InModes, in_modes, sorted_out
+from gantrytau.simulation.events.phases import phases
 from gantrytau.simulation.state_sizes import nominal_sizes
 from gantrytau_fmu.code.arrays import column
 
@@ -108,21 +108,8 @@ def switching(found: WithModes, system: System, also: frozenset[str] = frozenset
         timed=tuple(_is_timed(system, turn.margin) for turn in turns),
         conditions=tuple(found.pieces.asked(turn.mode.name(), found.dae) for turn in turns),
         outside=outside,
-        phases=_phases(column(seen), ca.vertcat(system.time, system.x, system.z)),
+        phases=phases(column(seen), ca.vertcat(system.time, system.x, system.z)),
     )
-
-
-def _phases(expressions: ca.SX, moving: ca.SX) -> ca.SX:
-    leaves, found = ca.symvar(expressions), []
-
-    def operation(operator: int, operands: list[ca.SX]) -> ca.SX:
-        if operator in (ca.OP_SIN, ca.OP_COS, ca.OP_TAN) and ca.depends_on(operands[0], moving):
-            found.append(operands[0] * (2 if operator == ca.OP_TAN else 1))
-        return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operator, *operands)
-
-    whole = ca.Function("whole", [column(leaves)], [ca.densify(expressions)], {"cse": True})
-    computed(whole, lambda _, k: leaves[k], ca.SX, operation)
-    return column(found)
 
 
 def _noise(system: System, margins: ca.SX) -> ca.SX:

@@ -230,13 +230,19 @@ static gt_status gt_call_continue(gt_component *c, const char *function) {
 
 /* ---- Model Exchange */
 
-static gt_status gt_call_completed(gt_component *c) {
+/* turned: whether something lies behind its turn that no importer can locate, as what a ramp of an input, whose rate is not
+ * known here, leads to exactly zero and on. */
+static gt_status gt_call_completed(gt_component *c, int *turned) {
     gt_gaps gaps;
     gt_status status = gt_fail(c, gt_completed(c->it));
 #if GT_DELAYS
     if (status < GT_DISCARD) status = gt_fail(c, gt_remember(c->it));
 #endif
-    if (GT_GAPS && status < GT_DISCARD && gt_look_at_gaps(c->it, &gaps) == GT_OK) gt_tighten(c->it, &gaps);
+    *turned = 0;
+    if (GT_GAPS && status < GT_DISCARD && gt_look_at_gaps(c->it, &gaps) == GT_OK) {
+        gt_tighten(c->it, &gaps);
+        *turned = gt_lies_behind(c->it, &gaps);
+    }
     return status;
 }
 

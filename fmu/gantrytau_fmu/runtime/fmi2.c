@@ -187,8 +187,8 @@ GT_EXPORT fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Bo
     (void)final;
     if (!gt_has(c, __func__, "a result", event_mode, 1) || !gt_has(c, __func__, "a result", terminate, 1))
         return fmi2Error;
-    *event_mode = *terminate = 0;
-    return (fmi2Status)gt_call_completed(c);
+    *terminate = 0;
+    return (fmi2Status)gt_call_completed(c, event_mode);
 }
 
 GT_EXPORT fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time) {

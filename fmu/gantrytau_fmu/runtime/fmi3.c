@@ -301,12 +301,16 @@ GT_EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
 
 GT_EXPORT fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean final, fmi3Boolean *event_mode,
                                                  fmi3Boolean *terminate) {
+    int turned = 0;
+    fmi3Status status;
     GT_ENTER_3(GT_EXCHANGE, GT_CONTINUOUS);
     (void)final;
     if (!gt_has(c, __func__, "a result", event_mode, 1) || !gt_has(c, __func__, "a result", terminate, 1))
         return fmi3Error;
-    *event_mode = *terminate = false;
-    return (fmi3Status)gt_call_completed(c);
+    status = (fmi3Status)gt_call_completed(c, &turned);
+    *event_mode = turned != 0;
+    *terminate = false;
+    return status;
 }
 
 GT_EXPORT fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {

@@ -238,6 +238,14 @@ static void gt_tighten(gt_instance *it, const gt_gaps *gaps) {
         if (gaps->left[i] > 0) it->now.slack[i] = 0;
 }
 
+/* Whether something is farther behind its turn than it was located. */
+static int gt_lies_behind(const gt_instance *it, const gt_gaps *gaps) {
+    int i;
+    for (i = 0; i < GT_GAPS; i++)
+        if (gaps->left[i] < -GT_NEAR * gaps->noise[i] - 1.5 * it->now.slack[i]) return 1;
+    return 0;
+}
+
 /* The next instant at which something turns by the time alone; INFINITY if there is none. */
 static gt_status gt_next_turn(gt_instance *it, double *next) {
     gt_margins margins;

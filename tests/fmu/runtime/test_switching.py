@@ -170,6 +170,29 @@ def test_outputs_follow_inputs_between_steps_and_steps_what_they_begin_with(tmp_
             assert run["x"] - before == pytest.approx(0.25 * min(u, 1.0), abs=1e-12)
 
 
+class Gate(Model):
+    """A clock that runs while an input is above a half."""
+
+    u = Input(start=0.0, description="input")
+    x = Real(start=0.0, fixed=True, description="time above")
+
+    def equations(self):
+        yield der(self.x) == if_else(self.u > 0.5, 1.0, 0.0)
+
+
+@VERSIONS
+def test_a_ramp_of_an_input_that_is_located_at_the_turn_itself_turns_within_a_step(tmp_path, version):
+    """Model Exchange does not know the rate of an input, so that exactly zero says nothing of what comes."""
+    import fmpy
+
+    path = export_fmu(Gate(), tmp_path / "gate.fmu", fmi=f"{version}.0")
+    ramp = np.array([(0.0, 0.0), (1.0, 1.0)], dtype=[("time", float), ("u", float)])
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=1.0, output_interval=0.01, fmi_type="ModelExchange", input=ramp, output=["x"]
+    )
+    assert found["x"][-1] == pytest.approx(0.5, abs=0.0101)
+
+
 def test_what_only_outputs_look_at_is_no_event(tmp_path):
     class Looked(Model):
         x = Real(start=1.0, fixed=True, description="oscillates")
