@@ -30,12 +30,12 @@ class Looks:
         self.trail, self.switches = trail, len(coordinates.switches)
         self._phases = coordinates.kept("phases", lambda: _phases_of(coordinates)) if self.switches else None
 
-    def by_steps(self, here: int, count: int, steps: int, least: float) -> bool:
+    def by_steps(self, here: int, count: int, steps: float, least: float) -> bool:
         """Lay places ahead closer if an integrator took many steps for some intervals; whether it did.
 
         least: how close at most, s.
         """
-        parts = steps // (STEPS_BETWEEN * count)
+        parts = int(steps // (STEPS_BETWEEN * count))
         if parts < 2 or not self.switches:
             return False
         return self._divide(here, np.full(min(max(count, AHEAD), self.trail.last - here), parts), least)

@@ -72,4 +72,4 @@ def test_they_stop_there_if_nothing_else_is_asked(windows):
 
 def test_what_else_is_asked_is_refused(windows):
     with pytest.raises(ModelError, match="found singular='pass', expected 'stop' or 'cross'"):
-        simulate(windows, stop=1.0, singular="pass")
+        simulate(windows, stop=1.0, singular="pass")  # pyright: ignore[reportArgumentType]
