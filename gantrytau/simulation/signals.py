@@ -50,8 +50,9 @@ def read_signals(
     Raises ModelError for what is none of these, has the wrong shape, does not cover the run, NaN or unsorted times.
     """
     found: dict[str, Signal] = {}
-    flat.refuse_twice("inputs", given)
-    for name, value in with_seeds(given, seed).items():
+    named = with_seeds(given, seed)
+    flat.refuse_twice("inputs", named)
+    for name, value in named.items():
         elements, shape = flat.expand(name), flat.shape(name)
         value = in_si(f"input {name}", value, flat.unit(name))
         course = with_course(name, value, shape, lambda: span)

@@ -3,6 +3,7 @@
 #ifndef GT_MOST_STEPS
 #define GT_MOST_STEPS 20000
 #endif
+#define GT_MOST_IN_A_STEP (10 * GT_MOST_STEPS) /* events of one communication step */
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LEAST_LOOK 1e-4     /* of a communication step: shorter slips may be missed */
 #define GT_QUARTER 1.6         /* rad: what angles in margins may turn in one step */
@@ -252,6 +253,10 @@ static gt_status gt_handle_events(gt_instance *it) {
             it->counted_since = it->now.time;
         }
         it->counted += info.again;
+        it->all += info.again;
+        if (it->all > GT_MOST_IN_A_STEP)
+            return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events in one communication step, the last of %s at time = %.9g s; "
+                          "take shorter steps", GT_NAME, GT_MOST_IN_A_STEP, it->last_event, it->now.time);
         if (it->counted > GT_MOST_EVENTS)
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s of one communication step, the last of %s at time = "
                           "%.9g s; take a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS,
@@ -283,7 +288,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
                       "tell", GT_NAME, size, time);
     it->now.time = time;
     it->stepping = 1;
-    it->counted = 0;
+    it->counted = it->all = 0;
     it->counted_since = time;
     if (it->now.waiting) gt_keep_before(it, 1);
     it->now.waiting = 0;

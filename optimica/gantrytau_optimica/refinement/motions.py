@@ -57,8 +57,8 @@ def _missed(found: Optimum) -> str:
     scheme = found.program.places.layouts[0].scheme.scheme
     if not found.success or scheme == "shooting" or not any(_doubtful(one) for one in trajectories):
         return ""
-    if not found.playback.complete:
-        return found.playback.lines()[0]
+    if not found.playback.complete:  # which the report tells: an integrator that stops proves no other motion
+        return ""
     worst = max(found.playback.defects, key=lambda d: d.relative, default=None)
     if worst is None or worst.relative <= 1.0:
         return ""

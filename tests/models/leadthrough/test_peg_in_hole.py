@@ -74,7 +74,8 @@ def test_without_torque_control_it_jams():
 
 def test_torque_about_the_clamp_may_turn_the_match_away():
     """Forces across have a lever there, and so has friction along the match: in half of the seeds it does not align."""
-    found = np.array([figures(result)[:2] for result in runs(5, tool=dict(tcp=0.095))])
+    patient = dict(patience=1e9)  # who does not lift it and aim again
+    found = np.array([figures(result)[:2] for result in runs(5, tool=dict(tcp=0.095), hand=patient)])
     away = found[:, 0] > 5.9
     assert np.count_nonzero(away) >= 2
     assert found[away, 1].max() < 20.0

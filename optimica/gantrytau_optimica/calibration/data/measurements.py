@@ -167,7 +167,7 @@ class Measurements(Record):
         found = self.select(slice(None))
         found.covariance = given
         found.covariance.flags.writeable = False
-        if shared is not None:
+        if shared is not None and np.size(shared):
             found.shared = _numbers("shared", shared)
             if found.shared.ndim != 3 or found.shared.shape[:2] != (len(self), 3):
                 raise ModelError(
