@@ -132,8 +132,8 @@ class _Elimination:
         self.rank: dict[str, tuple[int, ...]] = {}
         self.sized: dict[str, int] = {}  # how well it is known how large a variable is
         for place, variable in enumerate(flat.variables):
-            for name in variable.elements:
-                self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place)
+            for k, name in enumerate(variable.elements):
+                self.rank[name] = (name not in known, -int(variable.prefer), name.count("."), place, k)
                 self.sized[name] = 2 * variable.fixed + (
                     variable.start is not None or variable.nominal is not None
                 )
