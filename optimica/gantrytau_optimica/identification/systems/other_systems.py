@@ -9,6 +9,7 @@ from gantrytau_optimica.identification.systems.linear_fit import followed, input
 from gantrytau_optimica.identification.systems.subspace import SharedSpace, shared_space
 
 HALF = 0.5  # of the squares that the system leaves, below which another explains its data better
+LINE = 0.05  # of these squares: straight lines of less cannot halve them, and are not looked at
 
 Matrices = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -28,8 +29,9 @@ def others_explain_more(
     t = np.linspace(-1.0, 1.0, len(u))[:, None]
     slope = np.sum(t * y, axis=0) / np.sum(t * t)
     level = y - t * slope
-    steady = shared_space(u, level, block_rows)
-    if len(steady.correlations) >= order:
+    drifts = float(np.sum((t * slope) ** 2)) > LINE * _left(system, u, y)
+    steady = shared_space(u, level, block_rows) if drifts else None
+    if steady is not None and len(steady.correlations) >= order:
         before, after = _left(system, u, level), _left(system_of(steady, order, u, level), u, level)
         if after < HALF * before:
             yield Finding(
