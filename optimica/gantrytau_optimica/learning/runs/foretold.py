@@ -5,8 +5,8 @@ import numpy as np
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.learning.laws.learning import Stability
 
-# of the corrections, measured: the flexible robot under its actuators leaves 0.03 to 0.06, linear servos 0.001 to 0.16 with up
-# to 1 mm of noise, 0.36 to 0.75 where they are late by 25 samples, limited, or scatter by 5 mm
+# of the corrections, measured: the flexible robot under its actuators leaves 0.03 to 0.06, linear servos 0.001 to 0.16
+# with up to 1 mm of noise, 0.36 to 0.75 where they are late by 25 samples, limited, or scatter by 5 mm
 LEFT = 0.3
 
 
