@@ -126,7 +126,7 @@ def _shaped(
     request: Request,
     start: Mapping[str, float],
 ) -> Translated:
-    """The same with the values of some more parameters folded in, as they decide on the structure."""
+    """The sorted system with the values of the parameters `names` folded in: they decide on the structure."""
 
     def folded(one: FlatModel) -> FlatModel:
         parameters = (replace(p, fold=p.fold or not names.isdisjoint(p.elements)) for p in one.parameters)
@@ -197,7 +197,7 @@ def _preferences(flat: FlatModel, reduced: Reduced) -> dict[str, int]:
 def _refuse_reinits(dae: Translated) -> frozenset[str]:
     """ModelError for a variable that a when gives a new value although it is no state, or is one by another name.
 
-    A variable behind an equation of two unknowns may be a multiple of a state: the parameters that decide on it.
+    In an equation of two unknowns such a variable may be a multiple of a state: the parameters in that equation come back.
     """
     owners: dict[str, str] = {}
     for one in dae.flat.whens:

@@ -22,8 +22,8 @@ STEADY = (type, FunctionType, partial, int, float, complex, str, bytes, np.ndarr
 def digest(*things: Any) -> str:
     """One number for arrays, records, numbers, words, expressions and functions; numbers count to their last bit.
 
-    A function is its source, what it closes over, its defaults, and all of this of the functions, classes and values of
-    the user's own modules that it names; of what is installed it is the name.
+    A function counts with its source, closure and defaults, and with the functions, classes and values of the user's
+    modules that it names, read the same way. Installed code counts by its name.
     """
     found = hashlib.sha256()
     _feed(found, things, frozenset(), set())
@@ -31,7 +31,7 @@ def digest(*things: Any) -> str:
 
 
 def _feed(found: Any, thing: Any, around: frozenset[int], known: set[int]) -> None:
-    """around: what the thing is a part of; known: functions and classes that were fed already."""
+    """Feed a thing to the hash. around: containers of the thing; known: functions and classes fed already."""
     if id(thing) in around:
         found.update(b"circle;")
         return
@@ -139,7 +139,7 @@ def _used(there: Mapping[str, Any], words: Iterable[str]) -> dict[str, Any]:
 
 
 def _steady(thing: Any) -> bool:
-    """Whether a value of a module is code or numbers; what a function fills as it runs, as a cache of models, is not."""
+    """Whether a value of a module is code or numbers. A cache, filled while a function runs, is neither."""
     if isinstance(thing, (list, tuple, dict, set, frozenset)):
         return bool(thing) and all(map(_steady, thing.values() if isinstance(thing, dict) else thing))
     return isinstance(thing, STEADY) or is_dataclass(thing) or hasattr(thing, "__wrapped__")

@@ -1,4 +1,4 @@
-"""Derivatives that cancel between equations, so that structure alone promises more than the equations determine.
+"""Derivatives that cancel between equations: the incidence of the system is regular, its Jacobian is not.
 
 The signature method needs a regular Jacobian of the differentiated equations by the highest derivatives. Where constant
 factors u make its rows vanish, u^T J = 0, the equation that is differentiated least is replaced by the combination
@@ -36,9 +36,10 @@ DENOMINATOR = 1000  # of factors that are meant as fractions
 def combined(
     reduced: Reduced, flat: FlatModel, wanted: Sequence[str], error: Exception
 ) -> tuple[Reduced, frozenset[str]]:
-    """The equations with combinations in place of those whose derivatives cancel; or the parameters that make them cancel.
+    """Equations, linearly combined where derivatives cancel, and the parameters whose values make derivatives cancel.
 
-    Raises `error` where none do, StructureError where factors are not constant or a combination determines nothing.
+    With such parameters the equations come back unchanged. Raises `error` where no derivatives cancel, StructureError
+    where the factors of a combination are not constant or the combination determines no unknown.
     """
     found, names, parameters = reduced, [], set(reduced.table.independent)
     for _ in range(MOST_ORDERS * len(reduced.unknowns)):
@@ -70,7 +71,7 @@ def combined(
 
 
 def _points(values: Mapping[str, float], held: Set[str]) -> list[dict[str, float]]:
-    """Numbers of all symbols at random around some, but for those that are held."""
+    """Random values of all symbols around the given ones; the symbols `held` keep their values."""
     random = np.random.default_rng(0)
     moves = ((n, x, random.uniform(-SPREAD, SPREAD)) for _ in range(POINTS) for n, x in values.items())
     moved = [(n, x if n in held else x * (1 + share) if x else share) for n, x, share in moves]
@@ -78,9 +79,9 @@ def _points(values: Mapping[str, float], held: Set[str]) -> list[dict[str, float
 
 
 def _factors(indexed: Indexed, points: Sequence[Mapping[str, float]]) -> np.ndarray | None:
-    """Factors with which the rows of the Jacobian by the highest derivatives vanish at all points, or None.
+    """Factors (n,) of a sum of rows of the Jacobian by the highest derivatives, zero at all points; None if regular.
 
-    One of those that are differentiated least has the factor 1.
+    An equation that is differentiated least has the factor 1.
     """
     from scipy.linalg import qr, solve_triangular
 
@@ -112,7 +113,7 @@ def _factors(indexed: Indexed, points: Sequence[Mapping[str, float]]) -> np.ndar
 
 
 def _coefficients(indexed: Indexed, factors: np.ndarray) -> frozenset[str]:
-    """Names in the coefficients that cancel."""
+    """Names of all symbols in the entries of the rows with a factor."""
     level = indexed.levels[-1]
     rows = ca.vertcat(*(level.residuals[i] for i in np.flatnonzero(factors)))
     x = [leaf for leaf in ca.symvar(rows) if leaf.name() in set(level.unknowns)]
@@ -120,7 +121,7 @@ def _coefficients(indexed: Indexed, factors: np.ndarray) -> frozenset[str]:
 
 
 def _fraction(x: float) -> float:
-    """A number without the rounding of the simple fraction that it is meant to be."""
+    """The simple fraction within rounding of a number, else the number."""
     near = float(Fraction(x).limit_denominator(DENOMINATOR))
     return near if abs(near - x) <= NOISE * abs(x) else x
 
@@ -128,7 +129,7 @@ def _fraction(x: float) -> float:
 def _replaced(
     reduced: Reduced, indexed: Indexed, factors: np.ndarray, points: Sequence[Mapping[str, float]]
 ) -> Reduced:
-    """The equations with a combination in place of the one among them that is differentiated least and has the factor 1."""
+    """The equations; the combination replaces the equation of factor 1 that is differentiated least."""
     there = np.flatnonzero(factors).tolist()
     least = min(indexed.counts[i] for i in there)
     place = next(i for i in there if indexed.counts[i] == least and factors[i] == 1)

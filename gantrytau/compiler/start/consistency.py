@@ -37,7 +37,7 @@ LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Equations that are solved together: residuals, and symbols that may move; exact: those whose numbers are given."""
+    """Equations that are solved together: residuals, and unknown symbols; exact: symbols whose numbers are given."""
 
     residuals: tuple[ca.SX, ...]
     names: tuple[str, ...]  # of the residuals, for messages
@@ -70,7 +70,7 @@ class Level:
 
     @cached_property
     def _exact_slopes(self) -> tuple[np.ndarray, ca.Function]:
-        """Places of the derivatives that hold exact numbers alone; these, and how large their terms are."""
+        """Indices of the derivatives by exact numbers alone; the function of their values and term sizes."""
         x, _, jacobian = self._symbolic
         slopes = jacobian.nonzeros()
         others = column([leaf for leaf in x.elements() if leaf.name() not in self.exact])
@@ -79,7 +79,7 @@ class Level:
         return places, ca.Function("exact", [x], [column(exact), column(term_sizes(exact) if exact else [])])
 
     def certainty(self, numbers: np.ndarray) -> np.ndarray:
-        """By residual and leaf whether a derivative is sure not to be rounding, 1, or sure to be, -1."""
+        """Matrix (residuals, leaves): 1 where a derivative by exact numbers exceeds its rounding, -1 where not, else 0."""
         places, function = self._exact_slopes
         found = np.zeros((len(self.residuals), len(self.leaves)))
         slopes, sizes = (np.array(one).ravel() for one in function(numbers))
