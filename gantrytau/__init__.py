@@ -73,7 +73,7 @@ from gantrytau.language.functions import (
 )
 from gantrytau.language.model import Connector, Declared, Model, check_member, outer
 from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
-from gantrytau.language.scales import column_of, in_unit, si
+from gantrytau.language.scales import in_unit, si
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time
@@ -132,7 +132,6 @@ __all__ = [
     "check",
     "check_member",
     "chirp",
-    "column_of",
     "connect",
     "constraint",
     "cos",

@@ -241,17 +241,6 @@ def _examples(unit: str) -> str:
     return ", ".join([first, *others[:-1]]) + f" or {others[-1]}" if others else first
 
 
-def column_of(heading: str) -> tuple[str, Scale | None]:
-    """Name and unit of a column by its heading, as "phi [deg]"; None without a unit. ModelError for a unit that is none."""
-    name, _, unit = heading.strip().rpartition(" [")
-    if not name or not unit.endswith("]"):
-        return heading.strip(), None
-    try:
-        return name.strip(), scale(unit[:-1])
-    except ModelError as error:
-        raise ModelError(f"column '{heading.strip()}': {error}") from None
-
-
 def si(value: Any, unit: str | None = None) -> Any:
     """A value in SI, of a number or array and its unit, or of a text with both: `si(90, "deg")`, `si("90 deg")`.
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, in_unit, si
-from gantrytau.language.scales import USUAL, column_of, given, known_scale, scale
+from gantrytau.language.scales import USUAL, given, known_scale, scale
 from gantrytau.language.units import OTHERS, PREFIXED, PREFIXES, SYMBOLS, dimension, per_second, radians
 
 # from the definitions of the units: BIPM, SI brochure (2019), tables 8 and 7; NIST SP 811, appendix B
@@ -160,14 +160,6 @@ def test_lists_of_texts_and_texts_of_lists():
     assert given("r", np.array(["1 mm", "2 mm"]), "m") == [0.001, 0.002]
     same = [1.0, 2.0]
     assert given("r", same, "m") is same
-
-
-def test_headings_of_columns():
-    assert [(n, s and s.text) for n, s in map(column_of, ["phi [deg]", "R[0,1]", "k [1/s]", " x ", "u [-]"])] == [
-        ("phi", "deg"), ("R[0,1]", None), ("k", "1/s"), ("x", None), ("u", "-"),
-    ]  # fmt: skip
-    with pytest.raises(ModelError, match=r"column 'x \[foo\]': unit 'foo': there is no unit 'foo'"):
-        column_of("x [foo]")
 
 
 @pytest.mark.parametrize(

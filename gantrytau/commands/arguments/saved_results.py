@@ -1,6 +1,5 @@
 """A result that was saved before, read again: where the search for an optimum starts, or a motion to be seen."""
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.commands.printing.reporting import CommandError
+from gantrytau.language.tables.columns import Columns
 
 if TYPE_CHECKING:
     from gantrytau import Result
@@ -26,27 +26,21 @@ def read_result(file: Path, option: str = "--guess") -> "Result":
     if not file.is_file():
         raise CommandError(f"{option} {file}: there is no such file; check its path")
     try:
-        values = _csv(file) if file.suffix.lower() == ".csv" else _netcdf(file, option)
+        values = _columns(file) if file.suffix.lower() == ".csv" else _netcdf(file, option)
         time = values.pop("time")
         if time.size < 2 or not np.ptp(time) > 0:
             raise CommandError(f"{option} {file}: found {time.size} times, expected a motion over some time")
         return Result(time, values, title=file.name)
     except KeyError as error:
         raise CommandError(f"{option} {file}: found no {error}, expected a result over time") from error
-    except (OSError, ValueError, csv.Error, ModelError) as error:
+    except (OSError, ValueError, ModelError) as error:
         raise CommandError(f"{option} {file}: cannot be read as a result ({error})") from error
 
 
-def _csv(file: Path) -> dict[str, Any]:
+def _columns(file: Path) -> dict[str, Any]:
     """Column by name, without its unit, in SI."""
-    from gantrytau import column_of
-
-    with file.open(newline="", encoding="utf-8-sig") as opened:
-        header, *rows = [row for row in csv.reader(opened) if row] or [[]]
-    columns = [column_of(head) for head in header]
-    table = np.array(rows, dtype=float).reshape(len(rows), len(columns))
-    pairs = zip(columns, table.T, strict=True)
-    return {name: values if unit is None else unit.si(values) for (name, unit), values in pairs}
+    table = Columns.read(file)
+    return {name: table.column(name) for name in table.names}
 
 
 def _netcdf(file: Path, option: str) -> dict[str, Any]:

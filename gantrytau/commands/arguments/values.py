@@ -1,7 +1,6 @@
 """What stands behind `name=` on the command line: numbers, vectors, columns of CSV files."""
 
 import ast
-import csv
 import inspect
 import re
 from collections.abc import Callable, Iterable
@@ -9,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import gantrytau
-from gantrytau import InputSignal, ModelError, Samples, column_of, did_you_mean, si
+from gantrytau import InputSignal, ModelError, Samples, did_you_mean, si
 from gantrytau.commands.printing.reporting import CommandError, refusing
+from gantrytau.language.scales import scale
+from gantrytau.language.tables.columns import Columns
 
 KINDS = ("linear", "constant")  # of samples
 _VALUE = re.compile(r"[-+]?\.?\d.*|\[.*\]\s*\S+")  # begins like a number, or a vector with something behind
@@ -136,44 +137,11 @@ def _kept(text: str, make: Callable[[], Any]) -> Any:
 
 
 def samples(file: Path, column: str, kind: Any = "linear") -> Samples:
-    """A column of a CSV file with a header and a column `time`, in SI; `name [unit]` answers to `name` too."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as opened:
-            rows = [row for row in csv.reader(opened) if row]
-    except FileNotFoundError:
-        raise CommandError(f"{file}: there is no such file; check the path of --input") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise CommandError(f"{file}: cannot be read as CSV ({error})") from error
-    if len(rows) < 2:
-        raise CommandError(f"{file}: found {len(rows)} rows, expected a header and a row for each time")
-    header = [head.strip() for head in rows[0]]
-    places = {head.rpartition(" [")[0] or head: place for place, head in enumerate(header)}
-    places |= {head: place for place, head in enumerate(header)}
-    for wanted in ("time", column):
-        if wanted not in places:
-            raise CommandError(
-                f"{file} has no column '{wanted}'{did_you_mean(wanted, header)} "
-                "A file of samples has a header and a column 'time' in s"
-            )
-    try:
-        table = [[float(row[places[name]]) for name in ("time", column)] for row in rows[1:]]
-    except (ValueError, IndexError):
-        raise CommandError(f"{file}: {_bad_row(rows, places['time'], places[column])}") from None
-    with refusing(f"{file}: "):
-        (_, clock), (_, unit) = (column_of(header[places[name]]) for name in ("time", column))
-    times, values = zip(*table, strict=True)
-    times = [time if clock is None else clock.si(time) for time in times]
-    return Samples(times, values, kind=kind, unit=unit and unit.text)
-
-
-def _bad_row(rows: list[list[str]], *places: int) -> str:
-    """Words for the first row that has no number where one is needed."""
-    for line, row in enumerate(rows[1:], start=2):
-        for place in places:
-            try:
-                float(row[place])
-            except IndexError:
-                return f"row {line} ends before column '{rows[0][place]}'; complete or remove it"
-            except ValueError:
-                return f"row {line}, column '{rows[0][place]}': found '{row[place]}', expected a number"
-    raise AssertionError("every row has its numbers")
+    """A column of a CSV file with a header and a column `time`, in SI."""
+    table = Columns.read(file, "a row for each time")
+    if table.time is None:
+        raise ModelError(f"{file}: found no column of times, expected 'time' beside {', '.join(table.names)}")
+    column = next((table.names[k] for k, head in enumerate(table.header) if head == column), column)
+    values = table.column(column, filled=True)
+    unit = table.unit(column)
+    return Samples(table.time, values, kind=kind, unit=unit and scale(unit).coherent)

@@ -1,28 +1,34 @@
 """Columns of a CSV file, which are measured variables or inputs of a model, in its units."""
 
-import csv
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from gantrytau import FlatModel, ModelError, Samples, did_you_mean
-
-TIME = "time"
+from gantrytau.language.tables.columns import TIMES, Columns
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """The columns of a file (n,) by name, units of those that tell them, and times in s, None where there are none."""
+class Data:
+    """The table of a file, and its times in s, None where there are none."""
 
-    file: Path
-    values: Mapping[str, np.ndarray]
-    units: Mapping[str, str]
+    table: Columns
     times: np.ndarray | None
 
-    def part(self, begin: Any, stop: Any) -> "Columns":
+    @classmethod
+    def read(cls, file: Path) -> Self:
+        """The data in a file; ModelError where it cannot be read, naming the line."""
+        table = Columns.read(file, "a row for each time")
+        return cls(table, table.time)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the columns beside time."""
+        return [name for name in self.table.names if self.times is None or name.lower() not in TIMES]
+
+    def part(self, begin: Any, stop: Any) -> "Data":
         """The rows from begin to stop, both in s, None where there is no limit."""
         if self.times is None:
             return self
@@ -30,9 +36,7 @@ class Columns:
         for limit, sign in ((begin, 1.0), (stop, -1.0)):
             if isinstance(limit, (int, float)):
                 kept &= sign * (self.times - limit) >= 0
-        return replace(
-            self, values={name: column[kept] for name, column in self.values.items()}, times=self.times[kept]
-        )
+        return Data(self.table.select(kept), self.times[kept])
 
     def measured(self, flat: FlatModel, place: str, asked: Any, deviation: Any) -> dict[str, Any]:
         """Samples of variables, or values alone without times; ModelError for names that are not there.
@@ -42,11 +46,11 @@ class Columns:
         pairs = _pairs(place, asked)
         known = _names(flat, inputs=False)
         if asked is None:
-            pairs = {name: name for name in self.values if name in known}
+            pairs = {name: name for name in self.names if name in known}
             if not pairs:
                 raise ModelError(
-                    f"{place}: found no column of {self.file.name} that is a variable of the model "
-                    f'({", ".join(self.values)}), expected measured = {{ x = "its column" }}'
+                    f"{place}: found no column of {self.table.path.name} that is a variable of the model "
+                    f'({", ".join(self.names)}), expected measured = {{ x = "its column" }}'
                 )
         found = {}
         for name, column in pairs.items():
@@ -68,7 +72,7 @@ class Columns:
             if name not in known:
                 raise ModelError(f"{place}.held: the model has no input '{name}'{did_you_mean(name, known)}")
         found: dict[str, Any] = {}
-        for name in self.values:
+        for name in self.names:
             if name in known:
                 values = self._one(flat, place, name, name)
                 kind = "constant" if name in held else "linear"
@@ -76,19 +80,12 @@ class Columns:
         return found
 
     def _one(self, flat: FlatModel, place: str, name: str, column: str) -> np.ndarray:
-        """A column for a variable; ModelError for one that is not there, or in another unit than the variable."""
-        if column not in self.values:
-            raise ModelError(
-                f"{place}: {self.file.name} has no column '{column}'{did_you_mean(column, self.values)}"
-            )
+        """A column for a variable; ModelError for one that is not there, or has a unit of something else."""
         unit = next(v.unit for v in flat.variables if name in (v.name, *v.elements))
-        told = self.units.get(column, "")
-        if told and unit and told != unit:
-            raise ModelError(
-                f"{place}: column '{column}' of {self.file.name} is in {told}, expected {unit}, the unit of {name}; "
-                "convert the column, and write its unit"
-            )
-        return self.values[column]
+        try:
+            return self.table.column(column, *([unit] if unit else ()), filled=True)
+        except ModelError as error:
+            raise ModelError(f"{place}: {error}") from None
 
 
 def _names(flat: FlatModel, inputs: bool) -> list[str]:
@@ -128,41 +125,3 @@ def _deviations(place: str, names: list[str], deviation: Any) -> dict[str, float
         if name not in found:
             raise ModelError(f"{place}.deviation: found none of {name}, expected one for each, or for none")
     return {name: float(value) for name, value in found.items()}
-
-
-def read_columns(file: Path) -> Columns:
-    """A CSV file with a header; `x [m]` is x in m. ModelError where it cannot be read, naming the line."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as opened:
-            rows = [(k, row) for k, row in enumerate(csv.reader(opened), 1) if any(c.strip() for c in row)]
-    except FileNotFoundError:
-        raise ModelError(f"{file}: there is no such file; check data = ...") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ModelError(f"{file}: cannot be read as CSV ({error})") from error
-    if len(rows) < 2:
-        raise ModelError(f"{file}: found {len(rows)} rows, expected a header and a row for each time")
-    heads = [head.strip() for head in rows[0][1]]
-    names = [head.rpartition(" [")[0] or head for head in heads]
-    for name in names:
-        if names.count(name) > 1:
-            raise ModelError(f"{file}: found two columns '{name}', expected different names")
-    table = np.array([_row(file, line, row, names) for line, row in rows[1:]])
-    units = {name: head[len(name) + 2 : -1] for name, head in zip(names, heads, strict=True) if head != name}
-    values = dict(zip(names, table.T, strict=True))
-    if TIME in units and units[TIME] != "s":
-        raise ModelError(f"{file}: the times are in {units[TIME]}, expected s; convert them")
-    return Columns(file, values, units, values.pop(TIME, None))
-
-
-def _row(file: Path, line: int, row: list[str], names: list[str]) -> list[float]:
-    if len(row) != len(names):
-        raise ModelError(f"{file}, line {line}: found {len(row)} values, expected {len(names)}; repair it")
-    numbers = []
-    for name, cell in zip(names, row, strict=True):
-        try:
-            numbers.append(float(cell))
-        except ValueError:
-            raise ModelError(
-                f"{file}, line {line}, column '{name}': found '{cell}', expected a number"
-            ) from None
-    return numbers

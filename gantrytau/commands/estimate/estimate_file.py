@@ -9,7 +9,7 @@ from gantrytau import FlatModel, ModelError, did_you_mean, flatten, read_toml
 from gantrytau.commands.arguments.choice import Choice
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.values import signal
-from gantrytau.commands.estimate.data_columns import Columns, read_columns
+from gantrytau.commands.estimate.data_columns import Data
 from gantrytau.commands.printing.reporting import CommandError, refusing
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def _experiment(
     for key in ("inputs", "start", "set"):
         if not isinstance(table.get(key, {}), dict):
             raise ModelError(f"{place}.{key}: found {table[key]!r}, expected {{ name = value }}")
-    columns = read_columns(file.parent / table["data"])
+    columns = Data.read(file.parent / table["data"])
     variables = {n for v in flat.variables for n in (v.name, *v.elements)}
     part = columns.part(table.get("begin"), table.get("stop"))
     if part.times is not None and not part.times.size:
@@ -151,14 +151,14 @@ def _experiment(
         raise ModelError(f"{place}: {str(error).removeprefix('Experiment: ')}") from error
 
 
-def _part(columns: Columns, ends: Mapping[str, Any]) -> dict[str, Any]:
+def _part(columns: Data, ends: Mapping[str, Any]) -> dict[str, Any]:
     """Begin and stop, by default those of the data."""
     first = {} if columns.times is None else {"begin": float(columns.times[0])}
     return {**first, **ends}
 
 
 def _inputs(
-    file: Path, flat: FlatModel, place: str, table: Mapping[str, Any], columns: Columns
+    file: Path, flat: FlatModel, place: str, table: Mapping[str, Any], columns: Data
 ) -> dict[str, Any]:
     """What the file says of inputs, and columns that have their names."""
     held = table.get("held", [])

@@ -3,7 +3,6 @@
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -11,9 +10,8 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.model import Declared
-from gantrytau.language.scales import Scale, column_of, known_scale
 from gantrytau.language.settings import with_setting
-from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau.language.tables.columns import Columns
 
 Robot = TypeVar("Robot", bound=Declared)
 
@@ -98,27 +96,17 @@ def read_inertias(
     """
     _choice("about", about, ("centre", "frame"))
     _choice("products", products, ("tensor", "integrals"))
-    file = Path(path)
-    rows, separator = read_cells(file)
-    if len(rows) < 2:
-        raise ModelError(
-            f"{file}: found {len(rows)} lines, expected a header, {EXAMPLE}, and a line for each body"
-        )
-    table = _Columns(file, rows[0][1], separator)
+    table = Columns.read(path, "a line for each body")
     bodies: dict[str, dict[str, Any]] = {}
-    lines: dict[str, int] = {}
-    for line, row in rows[1:]:
-        check_cells(file, line, row, len(table.header), separator)
-        name = row[table.name].strip()
+    numbers = _numbers(table)
+    for k, (line, name) in enumerate(zip(table.lines, table.texts(_one(table, NAME)), strict=True)):
+        place = f"{path}: line {line}"
         if not name:
-            raise ModelError(f"{file}: line {line}: found no name, expected that of a body, as carts[0].body")
-        if name in lines:
-            raise ModelError(
-                f"{file}: line {line}: found '{name}' a second time, after line {lines[name]}, expected each body once"
-            )
-        lines[name] = line
-        bodies[name] = _body(f"{file}: line {line}: {name}", table, line, row, (about, products))
-    return Inertias(bodies, str(file))
+            raise ModelError(f"{place}: found no name, expected that of a body, as carts[0].body")
+        if name in bodies:
+            raise ModelError(f"{place}: found '{name}' a second time, expected each body once")
+        bodies[name] = _body(f"{place}: {name}", numbers[k], about, products)
+    return Inertias(bodies, str(path))
 
 
 def _choice(name: str, value: Any, known: tuple[str, ...]) -> None:
@@ -128,94 +116,69 @@ def _choice(name: str, value: Any, known: tuple[str, ...]) -> None:
         )
 
 
-class _Columns:
-    """Where the numbers of a body stand, and in which units."""
-
-    def __init__(self, file: Path, header: list[str], separator: str):
-        self.file, self.separator = file, separator
-        self.header, scales = [], []
-        for text in header:
-            heading, scale = _column(file, text)
-            self.header.append(heading)
-            scales.append(scale)
-        self.scales: list[Scale | None] = scales
-        self.name = self._place(NAME)
-        self.mass = self._place(MASS, "kg")
-        self.centre = self._all_or_none(CENTRE, "m")
-        self.diagonal = [self._place(names, "kg.m2") for names in DIAGONAL]
-        self.products = self._all_or_none(tuple(PRODUCTS.values()), "kg.m2")
-        for places in (self.centre or [], [*self.diagonal, *(self.products or [])]):
-            self._check_units(places)
-
-    def _found(self, names: tuple[str, ...], unit: str | None = None) -> int | None:
-        """The place of a column by one of its names, in any letters; ModelError for two, and for another unit."""
-        wanted = {name.lower() for name in names}
-        places = [k for k, heading in enumerate(self.header) if heading.replace(" ", "").lower() in wanted]
-        if len(places) > 1:
-            told = " and ".join(self.header[k] for k in places)
-            raise ModelError(f"{self.file}: found the columns {told}, expected one of them; delete the other")
-        if places and (scale := self.scales[places[0]]) is not None and unit is not None:
-            known_scale(f"{self.file}: column {self.header[places[0]]}", scale.text, unit)
-        return places[0] if places else None
-
-    def _place(self, names: tuple[str, ...], unit: str | None = None) -> int:
-        place = self._found(names, unit)
-        if place is None:
-            raise ModelError(
-                f"{self.file}: found no column {names[0]}, expected {EXAMPLE}{did_you_mean(names[0], self.header)}"
-            )
-        return place
-
-    def _all_or_none(self, names: tuple[tuple[str, ...], ...], unit: str) -> list[int] | None:
-        found = [self._found(each, unit) for each in names]
-        places = [place for place in found if place is not None]
-        if places and len(places) < len(names):
-            lost = ", ".join(each[0] for each, place in zip(names, found, strict=True) if place is None)
-            raise ModelError(
-                f"{self.file}: found no column {lost}, expected {', '.join(each[0] for each in names)}, all or none"
-            )
-        return places or None
-
-    def _check_units(self, places: list[int]) -> None:
-        """ModelError for columns of one kind of which some have a unit: nobody means a y in m beside an x in mm."""
-        units = {self.header[place]: self.scales[place] for place in places}
-        said = next(((name, unit.text) for name, unit in units.items() if unit is not None), None)
-        bare = [name for name, unit in units.items() if unit is None]
-        if said is not None and bare:
-            raise ModelError(
-                f"{self.file}: found {said[0]} in {said[1]} and {', '.join(bare)} without a unit, expected units of all "
-                f"of them or of none; write '{bare[0]} [{said[1]}]'"
-            )
-
-    def numbers(self, line: int, row: list[str], places: list[int] | None) -> np.ndarray:
-        """The numbers of three columns in SI, zeros where there are none; ModelError for what is empty or not finite."""
-        return np.array([self.number(line, row, place) for place in places]) if places else np.zeros(3)
-
-    def number(self, line: int, row: list[str], place: int) -> float:
-        """One of them."""
-        heading = self.header[place]
-        found = number_of(self.file, line, heading, row[place], self.separator)
-        if not np.isfinite(found):
-            what = f"'{row[place].strip()}'" if row[place].strip() else "an empty cell"
-            raise ModelError(f"{self.file}: line {line}, column {heading}: found {what}, expected a number")
-        scale = self.scales[place]
-        return found if scale is None else float(scale.si(found))
+def _numbers(table: Columns) -> np.ndarray:
+    """Mass, centre, moments and products of inertia of each body in SI, (n, 10), zeros for columns that are all missing."""
+    mass = [_one(table, MASS)]
+    centre, products = (_all_or_none(table, names) for names in (CENTRE, tuple(PRODUCTS.values())))
+    diagonal = [_one(table, names) for names in DIAGONAL]
+    for names in (centre, [*diagonal, *products]):
+        _check_units(table, names)
+    columns = [(mass, "kg"), (centre or [""] * 3, "m"), (diagonal, "kg.m2"), (products or [""] * 3, "kg.m2")]
+    zeros = np.zeros(len(table))
+    return np.column_stack(
+        [
+            table.column(name, unit, filled=True) if name else zeros
+            for names, unit in columns
+            for name in names
+        ]
+    )
 
 
-def _column(file: Path, text: str) -> tuple[str, Scale | None]:
-    """Name and unit of a heading; elements as J[0,1] are no units."""
-    try:
-        return column_of(text)
-    except ModelError as error:
-        raise ModelError(f"{file}: {error}") from None
+def _named(table: Columns, names: tuple[str, ...]) -> str:
+    """A column by one of its names, in any letters, empty for none; ModelError for two."""
+    wanted = {name.lower() for name in names}
+    found = [name for name in table.names if name.replace(" ", "").lower() in wanted]
+    if len(found) > 1:
+        raise ModelError(
+            f"{table.path}: found the columns {' and '.join(found)}, expected one of them; delete the other"
+        )
+    return found[0] if found else ""
 
 
-def _body(place: str, table: _Columns, line: int, row: list[str], ways: tuple[str, str]) -> dict[str, Any]:
-    """The modifications of a Body; place: for messages; ways: about and products, as `read_inertias` has them."""
-    about, products = ways
-    m, r = table.number(line, row, table.mass), table.numbers(line, row, table.centre)
-    J = np.diag(table.numbers(line, row, table.diagonal))
-    for (i, k), value in zip(PRODUCTS, table.numbers(line, row, table.products), strict=True):
+def _one(table: Columns, names: tuple[str, ...]) -> str:
+    if not (found := _named(table, names)):
+        raise ModelError(
+            f"{table.path}: found no column {names[0]}, expected {EXAMPLE}{did_you_mean(names[0], table.names)}"
+        )
+    return found
+
+
+def _all_or_none(table: Columns, names: tuple[tuple[str, ...], ...]) -> list[str]:
+    found = [_named(table, each) for each in names]
+    if any(found) and not all(found):
+        lost = ", ".join(each[0] for each, name in zip(names, found, strict=True) if not name)
+        raise ModelError(
+            f"{table.path}: found no column {lost}, expected {', '.join(each[0] for each in names)}, all or none"
+        )
+    return found if all(found) else []
+
+
+def _check_units(table: Columns, names: list[str]) -> None:
+    """ModelError for columns of one kind of which some have a unit: nobody means a y in m beside an x in mm."""
+    told = next((name for name in names if table.unit(name)), None)
+    bare = [name for name in names if not table.unit(name)]
+    if told and bare:
+        unit = table.unit(told)
+        raise ModelError(
+            f"{table.path}: found {told} in {unit} and {', '.join(bare)} without a unit, expected units of all of them or "
+            f"of none; write '{bare[0]} [{unit}]'"
+        )
+
+
+def _body(place: str, numbers: np.ndarray, about: str, products: str) -> dict[str, Any]:
+    """The modifications of a Body. place: for messages; numbers: (10,) as in `_numbers`; others as of `read_inertias`."""
+    m, r, J = float(numbers[0]), numbers[1:4], np.diag(numbers[4:7])
+    for (i, k), value in zip(PRODUCTS, numbers[7:], strict=True):
         J[i, k] = J[k, i] = -value if products == "integrals" else value
     if m <= 0:
         raise ModelError(f"{place}: found a mass of {m:g} kg, expected one above zero")

@@ -134,7 +134,7 @@ def moments(*three: float) -> np.ndarray:
         ([], "found 0 lines, expected a header"),
         ([HEADER], "found 1 lines, expected a header"),
         ([HEADER, "bar,3"], "line 2 has 2 cells, expected 11"),
-        ([HEADER, line("bar", MASS, CENTRE, J), line("bar", MASS, CENTRE, J)], "found 'bar' a second time, after line 2"),
+        ([HEADER, line("bar", MASS, CENTRE, J), line("bar", MASS, CENTRE, J)], "line 3: found 'bar' a second time"),
         ([HEADER, line(" ", MASS, CENTRE, J)], "line 2: found no name"),
         ([HEADER, line("bar", 0.0, CENTRE, J)], "bar: found a mass of 0 kg, expected one above zero"),
         ([HEADER, line("bar", -1.0, CENTRE, J)], "bar: found a mass of -1 kg"),

@@ -1,7 +1,6 @@
 """Clients that stream: a file row by row, a sensor, and a function of what was measured, as a hand that is pushed back."""
 
 import os
-import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -10,14 +9,12 @@ import numpy as np
 
 from gantrytau.errors import ModelError
 from gantrytau.inputs.samples import Samples
-from gantrytau.language.tables.csv_cells import check_cells, number_of, read_cells
+from gantrytau.language.tables.columns import TIMES, Columns
 from gantrytau_fmu.controller.board import ACTIVATE
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.clients import Sample
 from gantrytau_fmu.controller.exchange.messages import SEQUENCES
 
-TIMES = ("time", "t")
-HEADED = re.compile(r"\s*(.*?)\s*(?:\[([^\[\]]*[a-zA-Z%1][^\[\]]*)\])?\s*$")  # name [unit]; [0] is an index
 SAME = 1e-6  # of a period, by which the first two times may differ from it
 SHIFTED = 0.1  # of a period, by which rounding may shift those that follow
 
@@ -58,9 +55,10 @@ class FileStream(_Answering):
 
     def __init__(self, path: Path, name: str, at_end: Literal["hold", "stop"]):
         self.path, self.at_end, self.row = path, at_end, -1
-        self.columns, units = _header(path)
+        table, self.columns = _read(path)
+        units = [table.unit(name) or "1" for name in self.columns]
         super().__init__(name, Declaration([Channel(c, u) for c, u in zip(self.columns, units, strict=True)]))
-        self._times, self._rows = _table(path, self.columns)
+        self._times, self._rows = _numbers(path, self.columns)
 
     @property
     def state(self) -> str:
@@ -83,7 +81,7 @@ class FileStream(_Answering):
             self.row = -1
             return np.zeros(self.sends.size)
         if self.row < 0:
-            self._times, self._rows = _table(self.path, self.columns)
+            self._times, self._rows = _numbers(self.path, self.columns)
             self._first, self._timed = sample, False
         self.row = (sample.k - self._first.k) % SEQUENCES  # so that one that was lost on its way shifts none
         if self.row < len(self._rows):
@@ -212,60 +210,27 @@ def haptic_client(
     return FunctionClient(name, [Channel("f", "N", size)], push)
 
 
-def _header(path: Path) -> tuple[list[str], list[str]]:
-    """Names and units of the columns that are sent."""
-    rows, _ = read_cells(path)
-    if len(rows) < 2:
+def _read(path: Path) -> tuple[Columns, list[str]]:
+    """The table of a file, and the names of the columns that are sent."""
+    table = Columns.read(path, "rows of numbers")
+    names = list(table.names)
+    late = next((k for k, name in enumerate(names) if k and name in TIMES), None)
+    if late is not None:
         raise ModelError(
-            f"{path}: found {len(rows)} lines, expected a header, `name [unit]`, and rows of numbers"
+            f"{path}: found '{names[late]}' as column {late + 1}, expected the time as the first one; it is not sent"
         )
-    columns, units = [], []
-    for k, cell in enumerate(rows[0][1]):
-        found = HEADED.match(cell)
-        name, unit = (found[1], found[2]) if found else (cell.strip(), None)
-        if name in TIMES:
-            if k == 0:
-                continue
-            raise ModelError(
-                f"{path}: found '{name}' as column {k + 1}, expected the time as the first one; it is not sent"
-            )
-        if _is_number(name):
-            raise ModelError(
-                f"{path}: found the number {name} in the first line, expected a header, `name [unit]`"
-            )
-        columns.append(name)
-        units.append(unit or "1")
-    if not columns:
+    sent = names[names[0] in TIMES :]
+    if not sent:
         raise ModelError(f"{path}: found no column beside the time, expected what is to be sent")
-    return columns, units
+    return table, sent
 
 
-def _table(path: Path, columns: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Times (N,), none without such a column, and rows (N, n) of a file."""
-    rows, separator = read_cells(path)
-    head, body = rows[0][1], rows[1:]
-    found, _ = _header(path)
+def _numbers(path: Path, columns: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Times (N,), none without such a column, and rows (N, n) of a file, as they stand."""
+    table, found = _read(path)
     if found != list(columns):
         raise ModelError(
             f"{path}: found the columns {', '.join(found)}, expected {', '.join(columns)} as at first"
         )
-    numbers = []
-    for line, row in body:
-        check_cells(path, line, row, len(head), separator)
-        numbers.append([number_of(path, line, head[k], cell, separator) for k, cell in enumerate(row)])
-    table = np.array(numbers, dtype=float)
-    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
-    if bad.size:
-        raise ModelError(
-            f"{path}: line {body[bad[0]][0]}: found an empty cell or a number that is not finite"
-        )
-    timed = len(head) > len(columns)
-    return (table[:, 0] if timed else np.zeros(0)), table[:, int(timed) :]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    rows = np.column_stack([table.column(name, filled=True, si=False) for name in columns])
+    return (np.zeros(0) if table.time is None else table.time), rows

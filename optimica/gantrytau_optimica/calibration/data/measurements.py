@@ -2,7 +2,7 @@
 
 import copy
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -12,7 +12,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
-from gantrytau.language.tables.csv_cells import check_cells, headings, number_of, read_cells
+from gantrytau.language.tables.columns import Columns
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.fitting.finding import Finding
@@ -68,22 +68,22 @@ class Measurements(Record):
         files with the columns q, x, y, z, one for each guideway.
         Raises ModelError for columns that are missing and cells that are no numbers, with the line.
         """
-        columns, lines = _table(Path(path), _needed)
-        if "measured" in columns:
-            chosen = columns["measured"] != 0
-            columns, lines = {name: column[chosen] for name, column in columns.items()}, lines[chosen]
-        joints = sorted(
-            (name for name in columns if _ACTUATOR.fullmatch(name)), key=lambda name: int(name[1:])
-        )
-        q, r = (np.column_stack([columns[name] for name in names]) for names in (joints, _POSITION))
-        R = np.column_stack([columns[name] for name in _QUATERNION]) if "qw" in columns else None
+        table = Columns.read(path, "one line for each pose")
+        _check_names(table)
+        if "measured" in table:
+            table = table.select(table.column("measured", "1") != 0)
+        joints = [f"q{k + 1}" for k in range(sum(bool(_ACTUATOR.fullmatch(name)) for name in table.names))]
+        q = np.column_stack([table.column(name, "m", "rad") for name in joints])
+        r = np.column_stack([table.column(name, "m") for name in _POSITION])
+        R = np.column_stack([table.column(name, "1") for name in _QUATERNION]) if "qw" in table else None
         read = [_rail_file(Path(r)) if isinstance(r, (str, Path)) else r for r in rails] if rails else None
-        found = cls(q, r, R, read, numbers=_whole(columns.get("number")))
-        found.lines = lines
-        if all(name in columns for name in _COVARIANCE):
+        numbers = _whole(table.column("number", "1")) if "number" in table else None
+        found = cls(q, r, R, read, numbers=numbers)
+        found.lines = table.lines
+        if all(name in table for name in _COVARIANCE):
             covariance = np.empty((len(found), 3, 3))
             for name, (i, j) in _COVARIANCE.items():
-                covariance[:, i, j] = covariance[:, j, i] = columns[name]
+                covariance[:, i, j] = covariance[:, j, i] = table.column(name, "m2")
             return found.uncertain(covariance)
         return found
 
@@ -252,86 +252,31 @@ def _rail(k: int, rail: Any) -> np.ndarray:
     return found
 
 
-def _needed(names: Sequence[str]) -> str:
-    """What is wrong with the columns of measurements, in words; empty for nothing."""
-    joints = [name for name in names if _ACTUATOR.fullmatch(name)]
+def _check_names(table: Columns) -> None:
+    """ModelError for columns of measurements that are missing."""
+    joints = [name for name in table.names if _ACTUATOR.fullmatch(name)]
     expected = [f"q{k + 1}" for k in range(max(1, len(joints)))] + list(_POSITION)
-    if any(name in names for name in _QUATERNION):
+    if any(name in table for name in _QUATERNION):
         expected += _QUATERNION
-    missing = [name for name in expected if name not in names]
-    if not missing:
-        return ""
-    return (
-        f"found no column {', '.join(missing)}, expected q1,q2,q3,x,y,z, as many q as actuators, and qw,qx,qy,qz if "
-        "orientations were measured; write these names in the first line"
-    )
+    if missing := [name for name in expected if name not in table]:
+        raise ModelError(
+            f"{table.path}: found the header {','.join(table.names)}: found no column {', '.join(missing)}, expected "
+            "q1,q2,q3,x,y,z, as many q as actuators, and qw,qx,qy,qz if orientations were measured; write these names in "
+            "the first line"
+        )
 
 
-def _table(path: Path, wrong: Callable[[Sequence[str]], str]) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Columns of a CSV file by the names that are read, empty cells NaN, and the line of each row.
-
-    wrong: says what is wrong with the names of columns.
-    """
-    rows, separator = read_cells(path)
-    if not rows:
-        raise ModelError(f"{path}: found an empty file, expected a header and one line for each pose")
-    header, units = headings(path, rows[0][1], _units)
-    if words := _twice(header) or wrong(header):
-        raise ModelError(f"{path}: found the header {','.join(header)}: {words}")
-    numbers = [_cells(path, line, row, header, separator) for line, row in rows[1:]]
-    table = np.array(numbers, dtype=float).reshape(len(numbers), len(header))
-    columns = (x if unit is None else unit.si(x) for x, unit in zip(table.T, units, strict=True))
-    return dict(zip(header, columns, strict=True)), np.array([line for line, _ in rows[1:]], dtype=int)
-
-
-def _units(name: str) -> tuple[str, ...]:
-    """The units in which the numbers of a column may be, none for one that is not read."""
-    if name == "q" or _ACTUATOR.fullmatch(name):
-        return "m", "rad"
-    return ("m",) if name in _POSITION else ("m2",) if name in _COVARIANCE else ("1",) if _read(name) else ()
-
-
-def _twice(header: Sequence[str]) -> str:
-    twice = sorted({name for name in header if name and header.count(name) > 1})
-    return f"found several columns {', '.join(twice)}, expected one of each name" if twice else ""
-
-
-def _cells(path: Path, line: int, row: list[str], header: Sequence[str], separator: str) -> list[float]:
-    """The numbers of a line; of columns that are not read NaN."""
-    check_cells(path, line, row, len(header), separator)
-    return [
-        number_of(path, line, name, cell, separator) if _read(name) else np.nan
-        for name, cell in zip(header, row, strict=True)
-    ]
-
-
-def _read(name: str) -> bool:
-    """Whether a column of this name is read."""
-    return bool(_ACTUATOR.fullmatch(name)) or name in (
-        *_POSITION,
-        *_QUATERNION,
-        *_COVARIANCE,
-        "q",
-        "number",
-        "measured",
-    )
-
-
-def _whole(numbers: np.ndarray | None) -> np.ndarray | None:
+def _whole(numbers: np.ndarray) -> np.ndarray:
     """Numbers of poses, -1 for none."""
-    if numbers is None:
-        return None
     whole = np.isfinite(numbers) & (numbers == np.round(numbers)) & (np.abs(numbers) < 1e9)
     return np.where(whole, numbers, -1).astype(int)
 
 
 def _rail_file(path: Path) -> np.ndarray:
-    def wrong(names: Sequence[str]) -> str:
-        missing = [name for name in ("q", *_POSITION) if name not in names]
-        return f"found no column {', '.join(missing)}, expected q,x,y,z of a guideway" if missing else ""
-
-    columns, _ = _table(path, wrong)
-    return np.column_stack([columns[name] for name in ("q", *_POSITION)])
+    table = Columns.read(path, "one line for each point")
+    if missing := [name for name in ("q", *_POSITION) if name not in table]:
+        raise ModelError(f"{path}: found no column {', '.join(missing)}, expected q,x,y,z of a guideway")
+    return np.column_stack([table.column("q", "m", "rad"), *(table.column(x, "m") for x in _POSITION)])
 
 
 def thinned(count: int, poses: int = 200) -> np.ndarray:

@@ -1,7 +1,6 @@
 """`rig.toml`: a robot, what differs from run to run, a motion, and ways to learn it."""
 
 import importlib
-import re
 import runpy
 import sys
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ import numpy as np
 
 from gantrytau import GantryTauError, ModelError, did_you_mean, read_toml
 from gantrytau.describing.record import Record
+from gantrytau.language.tables.columns import Columns
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.rig import Rig
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
@@ -235,27 +235,14 @@ def _reference(place: str, table: Any, rig: Mapping[str, Any], folder: Path) -> 
         raise ModelError(
             f"{place}: found a file beside {', '.join(n for n in own if n != 'file')}, expected one of both"
         )
-    path = folder / own["file"]
-    try:
-        with path.open(encoding="utf-8-sig") as text:
-            header = [name.strip() for name in text.readline().lstrip("# ").split(",")]
-            rows = np.loadtxt(text, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise ModelError(
-            f"{at(place, 'file')}: {path} cannot be read ({error}), expected columns t, x, y, z"
-        ) from None
-    if rows.shape[1] != 4:
-        raise ModelError(
-            f"{at(place, 'file')}: found {rows.shape[1]} columns in {path}, expected t, x, y, z in s and m"
-        )
-    if [re.sub(rf"\s*\[{unit}\]$", "", name) for name, unit in zip(header, "smmm", strict=False)] != [
-        *"txyz"
-    ]:
-        raise ModelError(
-            f"{at(place, 'file')}: found the first line {','.join(header)!r} in {path}, expected the names t,x,y,z of "
-            "columns in s and m"
-        )
-    return _made(place, Reference, dict(t=rows[:, 0], r=rows[:, 1:]))
+    read = Columns.read(folder / own["file"], "one line for each time")
+    if read.time is None:
+        raise ModelError(f"{read.path}: found the columns {', '.join(read.names)}, expected t, x, y, z")
+    return _made(
+        place,
+        Reference,
+        dict(t=read.time, r=np.column_stack([read.column(x, "m", filled=True) for x in "xyz"])),
+    )
 
 
 def _cases(whole: str, entries: Any, common: Mapping[str, Any]) -> tuple[CaseOfFile, ...]:

@@ -81,7 +81,7 @@ def test_empty_cells_are_nan(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "empty file"),
+        ("", "found 0 lines, expected a header and one line for each pose"),
         ("a,b,c\n1,2,3\n", "header a,b,c: found no column q1, x, y, z"),
         ("q1,q3,x,y,z\n1,2,3,4,5\n", "found no column q2"),
         ("q1,q2,q3,x,y,Z\n1,2,3,4,5,6\n", "found no column z"),
