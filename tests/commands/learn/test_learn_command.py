@@ -201,13 +201,9 @@ def test_a_motion_of_ones_own_is_read_from_a_file(rig, tmp_path):
     start, _, rest = RIG.partition("[reference]")
     rig.write_text(f'{start}[reference]\nfile = "motion.csv"\n[learning]{rest.partition("[learning]")[2]}')
     assert read_rig(rig).reference.r[-1, 0] == pytest.approx(0.905)
-    for header in ("t [s],x [m],y [m],z [m]", "t,x [mm],y [mm],z [mm]", "x,y,z,t", "0,0.9,2.7,-0.7"):
-        np.savetxt(tmp_path / "motion.csv", r, delimiter=",", header=header, comments="")
-        if header.startswith("t [s]"):
-            assert len(read_rig(rig).reference) == 300
-            continue
-        with pytest.raises(ModelError, match=r"found the first line '.*' in .*, expected the names t,x,y,z"):
-            read_rig(rig)
+    np.savetxt(tmp_path / "motion.csv", r, delimiter=",", header="t [ms],x [mm],y,z", comments="")
+    scaled = read_rig(rig).reference
+    assert (scaled.t[-1], scaled.r[-1, 0]) == pytest.approx((t[-1] / 1e3, 0.905e-3))
     np.savetxt(tmp_path / "motion.csv", r[:, :3], delimiter=",", header="t,x,y")
-    with pytest.raises(Exception, match=r"found 3 columns in .*, expected t, x, y, z in s and m"):
+    with pytest.raises(ModelError, match="found no column 'z'"):
         read_rig(rig)

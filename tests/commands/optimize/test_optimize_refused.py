@@ -109,11 +109,9 @@ def test_misuse_is_told_before_the_work(fails, move, monkeypatch, options, messa
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.csv", "", "found no 'time', expected a result over time"),
         ("a.csv", "times,x\n0,1\n1,1\n", "found no 'time'"),
         ("a.csv", "time [s],x\n0,1\n", "found 1 times, expected a motion over some time"),
-        ("a.csv", "time [s],x\n0,1\n1,much\n", "cannot be read as a result (could not convert"),
-        ("a.csv", "time [s],x\n0,1\n1\n", "cannot be read as a result (setting an array"),
+        ("a.csv", "time [s],x\n0,1\n1,much\n", "a.csv: line 3, column x: found 'much', expected a number"),
         (
             "a.csv",
             "time [s],x\n1,1\n0,1\n",
