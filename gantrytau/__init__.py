@@ -77,6 +77,7 @@ from gantrytau.language.scales import in_unit, si
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time
+from gantrytau.language.tables.columns import Columns
 from gantrytau.language.tables.read_table import read_table
 from gantrytau.language.tables.tables import table
 from gantrytau.results.figures import has_windows
@@ -88,6 +89,7 @@ from gantrytau.whole_files import replacing
 __all__ = [
     "Array",
     "Bounds",
+    "Columns",
     "Connector",
     "Dae",
     "Declared",

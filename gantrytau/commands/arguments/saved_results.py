@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.language.tables.columns import Columns
 
 if TYPE_CHECKING:
     from gantrytau import Result
@@ -39,6 +38,8 @@ def read_result(file: Path, option: str = "--guess") -> "Result":
 
 def _columns(file: Path) -> dict[str, Any]:
     """Column by name, without its unit, in SI."""
+    from gantrytau import Columns
+
     table = Columns.read(file)
     return {name: table.column(name) for name in table.names}
 

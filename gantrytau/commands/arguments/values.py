@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import gantrytau
-from gantrytau import InputSignal, ModelError, Samples, did_you_mean, si
+from gantrytau import Columns, InputSignal, ModelError, Samples, did_you_mean, si
 from gantrytau.commands.printing.reporting import CommandError, refusing
-from gantrytau.language.scales import scale
-from gantrytau.language.tables.columns import Columns
 
 KINDS = ("linear", "constant")  # of samples
 _VALUE = re.compile(r"[-+]?\.?\d.*|\[.*\]\s*\S+")  # begins like a number, or a vector with something behind
@@ -142,6 +140,5 @@ def samples(file: Path, column: str, kind: Any = "linear") -> Samples:
     if table.time is None:
         raise ModelError(f"{file}: found no column of times, expected 'time' beside {', '.join(table.names)}")
     column = next((table.names[k] for k, head in enumerate(table.header) if head == column), column)
-    values = table.column(column, filled=True)
-    unit = table.unit(column)
-    return Samples(table.time, values, kind=kind, unit=unit and scale(unit).coherent)
+    values = table.column(column, filled=True, si=False)
+    return Samples(table.time, values, kind=kind, unit=table.unit(column))

@@ -6,8 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from gantrytau import FlatModel, ModelError, Samples, did_you_mean
-from gantrytau.language.tables.columns import TIMES, Columns
+from gantrytau import Columns, FlatModel, ModelError, Samples, did_you_mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +25,7 @@ class Data:
     @property
     def names(self) -> list[str]:
         """Names of the columns beside time."""
-        return [name for name in self.table.names if self.times is None or name.lower() not in TIMES]
+        return [name for name in self.table.names if name != self.table.time_name]
 
     def part(self, begin: Any, stop: Any) -> "Data":
         """The rows from begin to stop, both in s, None where there is no limit."""

@@ -116,10 +116,14 @@ class Columns:
         return replace(self, lines=self.lines[kept], rows=[self.rows[k] for k in kept])
 
     @cached_property
+    def time_name(self) -> str | None:
+        """The name of the first column that is called `time`, `t` or `timestamp`; None without one."""
+        return next((name for name in self.names if name.lower() in TIMES), None)
+
+    @cached_property
     def time(self) -> np.ndarray | None:
-        """Times in s, of the first column that is called `time`, `t` or `timestamp`; None without one."""
-        name = next((name for name in self.names if name.lower() in TIMES), None)
-        return None if name is None else self.column(name, "s", filled=True)
+        """Times in s, (n,), None without a column of them."""
+        return None if self.time_name is None else self.column(self.time_name, "s", filled=True)
 
     def _index(self, name: str) -> int:
         count = self.names.count(name)

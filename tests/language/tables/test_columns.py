@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
-from gantrytau.language.tables.columns import Columns, split_heading
+from gantrytau import Columns, ModelError
+from gantrytau.language.tables.columns import split_heading
 
 TIMES, LENGTHS = [0.0, 0.5, 1.0], [0.001, 0.0025, np.nan]
 
@@ -29,6 +29,7 @@ def read(folder, text, encoding="utf-8"):
 def test_one_table_in_six_dialects(tmp_path, text):
     for encoding in ("utf-8", "utf-8-sig"):
         table = read(tmp_path, text, encoding)
+        assert table.time is not None
         assert table.time.tolist() == TIMES
         assert np.array_equal(table.column("x", "m"), LENGTHS, equal_nan=True)
         assert table.unit("x") == "mm"
