@@ -250,7 +250,7 @@ def test_the_rest_stays_when_measurements_fail(folder, run):
     before = program.read_text()
     assert "p0" in before
     for rows in (slice(0, 0), slice(0, 5)):
-        assert run("calibrate", cells.measure(folder, rows)).exit_code == FAULT
+        assert run("calibrate", cells.measure(folder, rows)).exit_code != 0
         assert program.read_text() == before
 
 
