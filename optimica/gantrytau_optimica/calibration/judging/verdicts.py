@@ -28,7 +28,7 @@ from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
 STILL = 1e-4  # m, over which a cart must move to be calibrated
-SHARED = 2.0  # times what links show, from which on foretold errors of positions are shared by poses
+NOISE = ("noise larger", "noise smaller")
 MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
 EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
 
@@ -203,23 +203,8 @@ def judged(found: FittedRods) -> list[Finding]:
         *_far(others),
         *_in_doubt(found),
         *_undetermined(others),
-        *_shared(found),
+        *(f for f in found.diagnostics.findings if f.kind in NOISE),
     ]
-
-
-def _shared(found: FittedRods) -> Iterator[Finding]:
-    """Errors of positions that their covariance foretells and that closures do not show, as poses share them."""
-    data = found.measurements.select(found.rows)
-    if data.covariance is None:
-        return
-    foretold = float(np.sqrt(np.nanmedian(np.trace(data.covariance, axis1=1, axis2=2))))
-    left = np.sqrt(3) * found.noise
-    if foretold > SHARED * left:
-        words = (
-            f"positions are foretold to be off by {1e3 * foretold:.2g} mm, of which links show {1e3 * left:.2g} mm: the "
-            "rest is shared by neighbouring poses, as by lenses or a scale, and moves the calibrated tool with it"
-        )
-        yield Finding("shared", found.rows, words)
 
 
 def _far(found: FittedRods) -> Iterator[Finding]:

@@ -14,15 +14,9 @@ from gantrytau_optimica.calibration.fitting.pose_residuals import PoseResiduals,
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.judging.verdicts import check_count, usable_rows
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
-REMEDIES = {
-    "trend": "a parameter that is not named, a bent guideway, an eccentric axis or a gear; name more parameters",
-    "drift": "the device or the robot warmed up, settled or gave way; wait until they stand, and measure again",
-    "not white": "poses that follow each other err alike: a parameter that is not named, or the device drifts",
-}
 
 
 @dataclass(frozen=True)
@@ -77,7 +71,15 @@ def calibrate_by_names(
     residuals = replace(residuals, prior=_prior(residuals, asked.prior, x))
     residuals, minimum, noise = fitted(residuals, x, asked.loss == "robust")
     found = NamedCalibration(
-        robot, measurements, residuals, minimum, noise, rows, held_out, asked.loss, asked.frame
+        given=robot,
+        measurements=measurements,
+        residuals=residuals,
+        minimum=minimum,
+        noise=noise,
+        rows=rows,
+        held_out=held_out,
+        loss=asked.loss,
+        frame=asked.frame,
     )
     return replace(found, noise=_noise(found)).with_findings([*findings, *_judged(found)])
 
@@ -154,22 +156,4 @@ def _judged(found: NamedCalibration) -> list[Finding]:
             "and signs of the columns of q and r, and whether more parameters differ from nominal values"
         )
         findings.append(Finding("misfit", rows, words))
-    return [*findings, *diagnosed(found).findings]
-
-
-def diagnosed(found: NamedCalibration) -> Diagnostics:
-    """What is left of the coordinates, beside stray poses."""
-    residuals, x = found.residuals, found.minimum.x
-    left, J = (
-        residuals.poses(x) * residuals.weights[:, None],
-        residuals.slopes(x) * residuals.weights[:, None, None],
-    )
-    left[np.isin(found.rows, found.stray_rows)] = np.nan
-    signals = {
-        f"q of {n}": q - q.mean() for n, q in zip(residuals.tool.joints, residuals.data.q.T, strict=True)
-    }
-    series = [
-        ResidualSeries(name, left[:, k], jacobian=J[:, k], signals=signals, rows=found.rows)
-        for k, name in enumerate(("x", "y", "z"))
-    ]
-    return diagnose(series, remedies=REMEDIES)
+    return [*findings, *found.diagnostics.findings]

@@ -13,8 +13,8 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
 from gantrytau_optimica.calibration.report.report_page import html_report
+from gantrytau_optimica.calibration.report.residual_tests import residual_tests
 
 BINS = 24
 OTHERS = (
