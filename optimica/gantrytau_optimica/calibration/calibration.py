@@ -8,10 +8,11 @@ import numpy as np
 from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.report.report import Reported
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 
 
-class Calibration(FittedRods):
+class Calibration(Reported, FittedRods):
     """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements."""
 
     @cached_property

@@ -4,18 +4,15 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from gantrytau import Description, ModelError
+from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
-from gantrytau_optimica.calibration.report.described_calibration import calibration_described
-from gantrytau_optimica.calibration.report.report import write_report
 from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
 
@@ -51,17 +48,6 @@ class FittedNumbers(Record):
             f"<Calibration of {self.robot_name}{model}: {len(self.names)} numbers from {len(self.rows)} poses, "
             f"{self.error * 1e6:.3g} um in the mean of {len(self.held_out)} held out>"
         )
-
-    def __describe__(self, name: str = "") -> Description:
-        return calibration_described(self, name)
-
-    def report(self, path: str | Path) -> Path:
-        """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
-
-        A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
-        Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
-        """
-        return write_report(self, Path(path))
 
     @property
     @abstractmethod

@@ -16,6 +16,7 @@ from gantrytau_optimica.calibration.fitting.named_parameters import Named
 from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
 from gantrytau_optimica.calibration.judging.device_frames import Motion
 from gantrytau_optimica.calibration.judging.fitted_numbers import FittedNumbers
+from gantrytau_optimica.calibration.report.report import Reported
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
 
@@ -23,7 +24,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class NamedCalibration(FittedNumbers):
+class NamedCalibration(Reported, FittedNumbers):
     """A robot whose named parameters were found. `found.parameters["upper.r"]`, in the units of the model.
 
     given: the robot as it was; residuals: of the fitted poses, at their minimum; noise: deviation of a coordinate of a

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import Description, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.judging.device_frames import Motion
+from gantrytau_optimica.calibration.report.described_calibration import calibration_described
 from gantrytau_optimica.calibration.report.report_page import html_report
 from gantrytau_optimica.calibration.report.residual_tests import residual_tests
 
@@ -226,3 +227,18 @@ def write_report(found: Any, path: Path, about: About | None = None) -> Path:
             if temporary.exists():
                 temporary.unlink()
     return page
+
+
+class Reported:
+    """What shows a calibration: `describe`, and a report on file."""
+
+    def __describe__(self, name: str = "") -> Description:
+        return calibration_described(self, name)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
+
+        A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
+        Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
+        """
+        return write_report(self, Path(path))
