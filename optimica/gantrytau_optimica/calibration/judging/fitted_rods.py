@@ -11,7 +11,12 @@ from gantrytau.kinematics.rotations import mean_rotation, rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements, thinned
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
-from gantrytau_optimica.calibration.fitting.covariance import joint_covariance, link_noise, undetermined
+from gantrytau_optimica.calibration.fitting.covariance import (
+    as_told,
+    joint_covariance,
+    link_noise,
+    undetermined,
+)
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.named_parameters import (
     Named,
@@ -107,7 +112,9 @@ class FittedRods(FittedNumbers):
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Names of numbers that data do not hold: they stayed near their start values."""
-        return tuple(name for fit in self.fits for name in undetermined(fit))
+        return tuple(
+            name for fit in self.fits for name in undetermined(fit.minimum, fit.free_names, as_told(fit))
+        )
 
     @property
     def minima(self) -> tuple[Minimum, ...]:

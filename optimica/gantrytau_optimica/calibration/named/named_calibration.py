@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau import Model
 from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.design.identifiability import dependencies
-from gantrytau_optimica.calibration.fitting.covariance import MOVED
+from gantrytau_optimica.calibration.fitting.covariance import inverse_of, spread_by, undetermined
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.named_parameters import Named
 from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
@@ -94,8 +94,7 @@ class NamedCalibration(Reported, FittedNumbers):
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Names of numbers that data do not hold: they stayed near their start values."""
-        part = np.abs(self.minimum.directions[self.rank :]).max(axis=0, initial=0.0)
-        return tuple(name for name, share in zip(self.names, part, strict=True) if share > MOVED)
+        return undetermined(self.minimum, self.names)
 
     @property
     def dependent(self) -> dict[str, list[str]]:
@@ -104,30 +103,19 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def _covariance(self) -> Array:
-        residuals, x = self.residuals, self.minimum.x
-        J = residuals.slopes(x) * residuals.weights[:, None, None] ** 2
-        held = (
-            self.minimum.directions[: self.rank] / self.minimum.singular[: self.rank, None] * residuals.scale
-        )
-        spreads = residuals.data.spreads
-        roots = (
-            np.broadcast_to(np.eye(3), (len(J), 3, 3)) if spreads is None else residuals.frame(x)[0] @ spreads
-        )
-        parts = [np.swapaxes(J[:, :3], 1, 2) @ roots]
-        if J.shape[1] == 6:
-            worse = np.sqrt(np.sum(roots**2, axis=(1, 2)) / 3)
-            parts.append(np.swapaxes(J[:, 3:], 1, 2) * worse[:, None, None])
-        moved = self.noise * np.concatenate(
-            [part.transpose(1, 0, 2).reshape(len(x), -1) for part in parts], axis=1
-        )
-        if residuals.data.shared is not None:
-            shared = residuals.frame(x)[0] @ residuals.data.shared
-            moved = np.hstack([moved, np.einsum("nij,nik->jk", J[:, :3], shared)])
+        residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
+        J = np.swapaxes(residuals.slopes(x) * residuals.weights[:, None, None] ** 2, 1, 2)
+        R = residuals.frame(x)[0]
+        roots = np.broadcast_to(np.eye(3), (len(J), 3, 3)) if data.spreads is None else R @ data.spreads
+        worse = np.sqrt(np.sum(roots**2, axis=(1, 2)) / 3)[:, None, None]
+        moved = self.noise * np.concatenate([J[:, :, :3] @ roots, J[:, :, 3:] * worse], axis=2)
+        columns = [moved.transpose(1, 0, 2).reshape(len(x), -1)]
+        if data.shared is not None:
+            columns.append(np.einsum("nji,nik->jk", J[:, :, :3], R @ data.shared))
         pulled = self.minimum.slopes[len(self.minimum.slopes) - len(residuals.prior) :] / residuals.scale
         for row, (_, deviation) in zip(pulled, residuals.prior.values(), strict=True):
-            moved = np.hstack([moved, (row * np.abs(row).max() * deviation)[:, None]])
-        half = held.T @ (held @ moved)
-        return half @ half.T
+            columns.append((row * np.abs(row).max() * deviation)[:, None])
+        return spread_by(inverse_of(self.minimum, residuals.scale), *columns)
 
     @property
     def advice(self) -> str:

@@ -18,21 +18,7 @@ from gantrytau_optimica.calibration.report.report_page import html_report
 from gantrytau_optimica.calibration.report.residual_tests import residual_tests
 
 BINS = 24
-OTHERS = (
-    ".pdf",
-    ".csv",
-    ".txt",
-    ".md",
-    ".xlsx",
-    ".xls",
-    ".docx",
-    ".doc",
-    ".odt",
-    ".xml",
-    ".toml",
-    ".png",
-    ".svg",
-)
+OTHERS = (".pdf", ".csv", ".txt", ".md", ".xlsx", ".xls", ".docx", ".doc", ".odt", ".xml", ".toml", ".png", ".svg")  # fmt: skip
 LISTED = 2000  # poses, of more the worst
 
 
