@@ -1,4 +1,4 @@
-"""What every calibration answers: how sure its numbers are, what it leaves, and how well it foretells poses held out."""
+"""The record of every calibration: covariance of its numbers, residual diagnostics, errors of poses held out."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -13,6 +13,7 @@ from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
+from gantrytau_optimica.calibration.rods.error_models import shared_name
 from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
 
@@ -100,7 +101,7 @@ class FittedNumbers(Record):
 
     @abstractmethod
     def residual_series(self) -> list[ResidualSeries]:
-        """What is left of the fitted poses, in their order."""
+        """Residuals of the fitted poses, in their order."""
 
     @property
     def rank(self) -> int:
@@ -130,7 +131,7 @@ class FittedNumbers(Record):
         return self._covariance[np.ix_(places, places)]
 
     def _places(self, name: str) -> list[int]:
-        for alias in (name, *self._aliases(name)):
+        for alias in (name, shared_name(name)):
             those = [k for k, n in enumerate(self.names) if alias in (n, n.rpartition("[")[0])]
             if lost := [self.names[k] for k in those if self.names[k] in self.undetermined]:
                 raise ModelError(
@@ -143,10 +144,6 @@ class FittedNumbers(Record):
         if name in self.parameters:
             raise ModelError(f"covariance: {name} was not identified but held at its value; leave it out")
         raise ModelError(f"covariance: there is no parameter '{name}'{did_you_mean(name, self.parameters)}")
-
-    def _aliases(self, name: str) -> Sequence[str]:
-        """Other names of a number."""
-        return ()
 
     @property
     def deviations(self) -> dict[str, float]:
@@ -182,7 +179,7 @@ class FittedNumbers(Record):
 
     @cached_property
     def diagnostics(self) -> Diagnostics:
-        """What the fit leaves, beside stray poses: explained share, size by told noise, correlations, trends, groups."""
+        """Residual diagnostics without stray poses: explained share, size by told noise, correlation, trends, groups."""
         good = ~np.isin(self.rows, self.stray_rows)
         series = [replace(s, left=np.where(good, s.left, np.nan)) for s in self.residual_series()]
         return diagnose(series, remedies=REMEDIES)

@@ -1,6 +1,6 @@
 """What a fit of rods found: parameters, how sure they are, and how well they predict poses that were held out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -33,7 +33,6 @@ from gantrytau_optimica.calibration.judging.plausibility import Misses
 from gantrytau_optimica.calibration.judging.suspicion import Suspicion, suspicion
 from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.rods.arm_kinematics import ArmKinematics
-from gantrytau_optimica.calibration.rods.error_models import COMMON
 from gantrytau_optimica.calibration.rods.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
@@ -91,7 +90,6 @@ class FittedRods(FittedNumbers):
 
     @property
     def robot_name(self) -> str:
-        """What the robot is called."""
         return self.nominal_rods.name
 
     @property
@@ -106,12 +104,10 @@ class FittedRods(FittedNumbers):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the identified numbers, scalars."""
         return tuple(name for fit in self.fits for name in fit.free_names)
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of numbers that data do not hold: they stayed near their start values."""
         return tuple(
             name for fit in self.fits for name in undetermined(fit.minimum, fit.free_names, as_told(fit))
         )
@@ -148,17 +144,9 @@ class FittedRods(FittedNumbers):
 
     @property
     def advice(self) -> str:
-        """What to do about numbers that data do not hold."""
         return (
             f"{'turn the plate more between' if self.plate_turns else 'measure more'} poses, or give a prior"
         )
-
-    def _aliases(self, name: str) -> Sequence[str]:
-        """What a direction of an arm is called that is that of all."""
-        found = [
-            COMMON + name[len(a.direction) :] for a in self.nominal_rods.arms if name.startswith(a.direction)
-        ]
-        return found[:1]
 
     @cached_property
     def chains(self) -> CalibratedKinematics | ArmKinematics:
@@ -175,7 +163,6 @@ class FittedRods(FittedNumbers):
 
     @cached_property
     def error_vectors(self) -> np.ndarray:
-        """Measured less predicted positions of the held-out poses, (N, 3) in m."""
         return self._held_out.r - self._predicted[0]
 
     @cached_property
@@ -189,12 +176,10 @@ class FittedRods(FittedNumbers):
 
     @cached_property
     def stray_rows(self) -> np.ndarray:
-        """Rows, fitted or held out, that close worse than noise explains."""
         return self.suspicion.rows
 
     @cached_property
     def angle_errors(self) -> np.ndarray:
-        """Angles between measured and predicted orientations of the held-out poses, (N,) in rad; NaN without R."""
         R = self.measurements.R
         if R is None:
             return np.full(len(self.held_out), np.nan)
@@ -217,7 +202,6 @@ class FittedRods(FittedNumbers):
         return found
 
     def residual_series(self) -> list[ResidualSeries]:
-        """Closure errors of the links."""
         return closure_series(self.fits, self._fitted, self.rows)
 
     @cached_property

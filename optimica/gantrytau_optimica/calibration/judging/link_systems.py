@@ -101,9 +101,7 @@ def variance(systems: Sequence[LinkSystem]) -> float:
 
 
 def closure_series(fits: Sequence[Fit], data: Measurements, rows: np.ndarray) -> list[ResidualSeries]:
-    """Closure errors of the links at the fitted poses, for `diagnose`, of links that share numbers together; rows: their
-    numbers.
-    """
+    """Residual series of the links at the fitted poses; links that share numbers are one quantity; rows: of the data."""
     systems = link_systems(fits, data)
     noise = _told(systems, data)
     away = systems[0].certainty[:, 0] * data.distances
@@ -124,8 +122,8 @@ def closure_series(fits: Sequence[Fit], data: Measurements, rows: np.ndarray) ->
 
 
 def _told(systems: Sequence[LinkSystem], data: Measurements) -> list[np.ndarray] | None:
-    """Deviations of closure errors of each link, (N,) in m, by the covariance of positions as it was told, less what numbers
-    take up of a shared part, and by noise of orientations as errors show it.
+    """Told deviations of the closure errors of each link, (N,) in m: by the covariance of positions, less the shared part
+    that numbers take up, and by the estimated noise of orientations.
     """
     if data.spreads is None or data.deviation is None:
         return None

@@ -201,7 +201,7 @@ def judged(found: FittedRods) -> list[Finding]:
 
 
 def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Finding]:
-    """Rows of which it is said what is wrong with them."""
+    """The finding on outliers; said: how they are off, the verb first."""
     if not rows.size:
         return
     one, (verb, *words) = len(rows) == 1, said.split()
@@ -215,7 +215,7 @@ def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Find
 
 
 def not_converged(found: FittedNumbers) -> Iterator[Finding]:
-    """Numbers that may still be far from the minimum."""
+    """The finding on a fit without convergence."""
     if not found.success:
         words = (
             "the fit did not converge; its numbers are those of the last step; measure more poses, or give "

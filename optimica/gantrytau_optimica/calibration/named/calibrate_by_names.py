@@ -21,7 +21,7 @@ FAR = 0.02  # m, of typical places, that named parameters leave: more are other 
 
 @dataclass(frozen=True, eq=False)
 class Usable(Record):
-    """The tool of the robot, rows that it can be fitted to, and what was noticed of the measurements."""
+    """Tool function of the robot, rows of the measurements that take part, and findings on these."""
 
     tool: ToolFunction
     rows: np.ndarray
@@ -31,7 +31,7 @@ class Usable(Record):
 def usable(
     robot: Model, measurements: Measurements, parameters: Sequence[str], joints: Sequence[str] | None
 ) -> Usable:
-    """What is there to fit; joints: columns of q, None for those that are driven."""
+    """Tool function and usable rows of a robot; joints: columns of q, None for the driven ones."""
     tool = tool_function(robot, parameters, joints, measurements.R is not None)
     if measurements.q.shape[1] != len(tool.joints):
         raise ModelError(
@@ -98,7 +98,7 @@ def _noise(found: NamedCalibration) -> float:
 
 
 def _judged(found: NamedCalibration) -> list[Finding]:
-    """What is doubtful after a fit: stray poses, numbers that data do not hold, and what else is left."""
+    """Findings on a fit: outliers, convergence, undetermined numbers, size and structure of the residuals."""
     findings = [*outliers(found, found.stray_rows, "lie off by more than noise"), *not_converged(found)]
     if found.undetermined:
         told = [

@@ -40,12 +40,10 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @property
     def robot_name(self) -> str:
-        """What the robot is called."""
         return self.residuals.tool.dae.name
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the identified numbers, scalars; those of a fitted frame first."""
         return self.residuals.names
 
     @property
@@ -93,7 +91,6 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        """Names of numbers that data do not hold: they stayed near their start values."""
         return undetermined(self.minimum, self.names)
 
     @property
@@ -119,7 +116,6 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @property
     def advice(self) -> str:
-        """What to do about numbers that data do not hold."""
         framed = any(set(others) & set(FRAME) for others in self.dependent.values())
         base = ", or measure in the base of the robot, frame='base'" if framed else ""
         return f"leave them out of parameters=, measure other poses, or give prior={{name: deviation}}{base}"
@@ -134,18 +130,15 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def error_vectors(self) -> Array:
-        """Measured less predicted positions of the held-out poses, (N, 3) in m."""
         return self._misses[:, :3]
 
     @cached_property
     def angle_errors(self) -> Array:
-        """Angles between measured and predicted orientations of the held-out poses, (N,) in rad; NaN without R."""
         turns = self._misses[:, 3:]
         return np.linalg.norm(turns, axis=1) if turns.size else np.full(len(turns), np.nan)
 
     @cached_property
     def stray_rows(self) -> Array:
-        """Rows, fitted or held out, that are off by more than noise explains."""
         known = np.union1d(self.rows, self.held_out)
         return known[strays(replace(self.residuals, data=self.measurements.select(known)), self.minimum.x)]
 
@@ -163,7 +156,6 @@ class NamedCalibration(Reported, FittedNumbers):
         ]
 
     def residual_series(self) -> list[ResidualSeries]:
-        """What is left of the coordinates of the tool, in the base."""
         residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
         weights = residuals.weights[:, None]
         left, J = residuals.poses(x) * weights, residuals.slopes(x) * weights[..., None]

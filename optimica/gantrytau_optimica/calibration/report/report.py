@@ -18,7 +18,8 @@ from gantrytau_optimica.calibration.report.report_page import html_report
 from gantrytau_optimica.calibration.report.residual_tests import residual_tests
 
 BINS = 24
-OTHERS = (".pdf", ".csv", ".txt", ".md", ".xlsx", ".xls", ".docx", ".doc", ".odt", ".xml", ".toml", ".png", ".svg")  # fmt: skip
+OTHERS = (".pdf", ".csv", ".txt", ".md", ".xlsx", ".xls", ".docx", ".doc", ".odt", ".xml", ".toml")
+PICTURES = (".png", ".svg")
 LISTED = 2000  # poses, of more the worst
 
 
@@ -178,7 +179,7 @@ def write_report(found: Any, path: Path, about: About | None = None) -> Path:
 
     Raises ModelError for names that end in that of another format, and for what cannot be written.
     """
-    if path.suffix.lower() in OTHERS:
+    if path.suffix.lower() in OTHERS + PICTURES:
         raise ModelError(
             f"report: found the name '{path.name}', expected one that ends in .html, for a page with a .json beside it; "
             "print the page from a browser for other formats"
