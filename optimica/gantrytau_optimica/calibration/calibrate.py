@@ -25,7 +25,7 @@ from gantrytau_optimica.calibration.judging.verdicts import (
     not_in_base,
     usable_rows,
 )
-from gantrytau_optimica.calibration.named.calibrate_by_names import AskedByName, calibrate_by_names, usable
+from gantrytau_optimica.calibration.named.calibrate_by_names import calibrate_by_names, usable
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.calibration.rods.arm_closure import arms_of
 from gantrytau_optimica.calibration.rods.error_models import (
@@ -104,20 +104,18 @@ def calibrate(
     frame is fitted beside them. joints: columns of q, by default those that are driven.
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
-    _check_words(constraints, method=method, start=start, orientation=orientation, loss=loss, frame=frame)
+    if not isinstance(measurements, Measurements):
+        raise ModelError(
+            f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
+        )
+    words = dict(method=method, start=start, orientation=orientation, loss=loss, frame=frame)
+    _check_words(constraints, parameters is not None, model, words)
     if parameters is not None:
-        _refuse_for_rods(model, method, start, orientation)
-        return _by_names(robot, measurements, AskedByName(parameters, joints, prior, loss, frame), holdout)
+        known = usable(robot, measurements, parameters, joints)
+        split = _split(known.rows, holdout, measurements)
+        return calibrate_by_names(robot, measurements, known, split, prior=prior, loss=loss, frame=frame)
     asked = _Asked(model, start, prior, loss, orientation, frame)
     return _on_rods(read_nominal(robot), measurements, asked, method, holdout, constraints)
-
-
-def _by_names(robot: Model, measurements: Measurements, asked: AskedByName, holdout: Any) -> NamedCalibration:
-    _check_measurements(measurements)
-    tool, rows, findings = usable(robot, measurements, asked)
-    return calibrate_by_names(
-        robot, measurements, asked, _split(rows, holdout, measurements), (tool, findings)
-    )
 
 
 def _on_rods(
@@ -137,15 +135,15 @@ def _on_rods(
     fits, known, there = _fitted(nominal_rods, measurements.select(fitted), asked, (rows, fitted, findings))
     fits = fits if method == "gauss-newton" else _by_ipopt(fits, constraints)
     found = Calibration(
-        nominal_rods,
-        measurements,
-        asked.model,
-        tuple(fits),
-        fitted,
-        held_out,
-        method,
-        asked.loss,
-        asked.orientation,
+        nominal_rods=nominal_rods,
+        measurements=measurements,
+        model=asked.model,
+        fits=tuple(fits),
+        rows=fitted,
+        held_out=held_out,
+        method=method,
+        loss=asked.loss,
+        orientation=asked.orientation,
         nominal=known,
         frame=asked.frame,
         motion=None if there is None else Motion.of(there),
@@ -214,7 +212,10 @@ def _needs_values(prior: Mapping[str, Any] | None) -> bool:
     return isinstance(prior, Mapping) and any(not isinstance(given, tuple) for given in prior.values())
 
 
-def _check_words(constraints: Mapping[str, Any] | None, **words: str) -> None:
+def _check_words(
+    constraints: Mapping[str, Any] | None, by_names: bool, model: Any, words: Mapping[str, str]
+) -> None:
+    """ModelError for words that are not known, or speak of rods beside parameters=."""
     known = dict(
         method=("gauss-newton", "ipopt"),
         start=("nominal", "linear"),
@@ -228,6 +229,14 @@ def _check_words(constraints: Mapping[str, Any] | None, **words: str) -> None:
                 f"calibrate: found {name}={word!r}, expected {' or '.join(map(repr, known[name]))}",
                 argument=name,
             )
+    usual = dict(method="gauss-newton", start="nominal", orientation="local", model=None)
+    for name, word in usual.items() if by_names else ():
+        found = words.get(name, model)
+        if found != word:
+            raise ModelError(
+                f"calibrate: found {name}={found!r} with parameters=, expected {word!r}: it speaks of robots on rods",
+                argument=name,
+            )
     if constraints and words["method"] != "ipopt":
         raise ModelError(
             "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
@@ -235,26 +244,7 @@ def _check_words(constraints: Mapping[str, Any] | None, **words: str) -> None:
         )
 
 
-def _refuse_for_rods(*given: Any) -> None:
-    """ModelError for words that speak of rods beside parameters=."""
-    usual = dict(model=None, method="gauss-newton", start="nominal", orientation="local")
-    for (name, word), found in zip(usual.items(), given, strict=True):
-        if found != word:
-            raise ModelError(
-                f"calibrate: found {name}={found!r} with parameters=, expected {word!r}: it speaks of robots on rods",
-                argument=name,
-            )
-
-
-def _check_measurements(measurements: Any) -> None:
-    if not isinstance(measurements, Measurements):
-        raise ModelError(
-            f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
-        )
-
-
 def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:
-    _check_measurements(measurements)
     expected = len(robot.rods.joints)
     if measurements.q.shape[1] != expected:
         raise ModelError(

@@ -1,24 +1,19 @@
 """What `calibrate` found: identified rods, as a robot, as kinematics and as a report."""
 
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gantrytau import Description, GantryTauError, Model, ModelError
+from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
-from gantrytau_optimica.calibration.report.described_calibration import calibration_described
-from gantrytau_optimica.calibration.report.report import write_report
+from gantrytau_optimica.calibration.report.report import Reported
 from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 
 
-class Calibration(FittedRods):
+class Calibration(Reported, FittedRods):
     """A calibrated robot. `found.parameters["arms[0].length"]` is in m, vectors are arrays (3,), or name elements."""
-
-    def __describe__(self, name: str = "") -> Description:
-        return calibration_described(self, name)
 
     @cached_property
     def kinematics(self) -> Any:
@@ -66,11 +61,3 @@ class Calibration(FittedRods):
         arms = {name: value for arm in self.arms for name, value in arm.values.items()}
         names = [table.offset for table in self.nominal_rods.rods.turntables]
         return {name: arms[name] for name in names}
-
-    def report(self, path: str | Path) -> Path:
-        """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
-
-        A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
-        Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
-        """
-        return write_report(self, Path(path))

@@ -186,6 +186,18 @@ class Measurements(Record):
         return rest + np.maximum(least - np.trace(rest, axis1=1, axis2=2) / 3, 0.0)[:, None, None] * np.eye(3)
 
     @property
+    def deviation(self) -> float | None:
+        """Told deviation of a coordinate of a pose of median covariance, m, without what poses share."""
+        if self.covariance is None:
+            return None
+        return float(np.nanmedian(np.sqrt(np.trace(self._own, axis1=1, axis2=2) / 3)))
+
+    @property
+    def distances(self) -> np.ndarray:
+        """Of positions from their middle, (N,) in m."""
+        return np.linalg.norm(self.r - self.r.mean(axis=0), axis=1)
+
+    @property
     def certainty(self) -> np.ndarray | None:
         """Weights of poses, (N,), 1 for one of median covariance; None where all are as sure."""
         if self.covariance is None:

@@ -213,7 +213,7 @@ def _of_arm(
         redundant=dependencies(directions[~determined], scale, arm.names),
         collinear=dependencies(directions[determined & (s < least)], scale, arm.names),
         singular_values=s,
-        _half=scale[:, None] * half_covariance(factor, spread, max(least, NOTHING * s[0]))[0],
+        _half=scale[:, None] * half_covariance(factor, spread, max(least, NOTHING * s[0])),
         _directions=directions,
         _held=determined & (s >= least),
     )

@@ -13,7 +13,9 @@ stands for u, C in units of its median size, and w is worse by as much; W are th
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
@@ -116,31 +118,32 @@ def joint_covariance(
     """
     parts = [(f, k) for f, fit in enumerate(fits) for k in range(len(fit.group.chains))]
     starts = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
-    middle = np.zeros((starts[-1], starts[-1]))
     moved = _moved(fits, parts, loss, spreads, shared)
-    rows = [_slopes(fits[f], k) for f, k in parts]
-    if shared is not None:
-        together = np.zeros((starts[-1], shared.shape[2]))
-        for (f, k), J in zip(parts, rows, strict=True):
-            u = fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]])[0]
-            together[starts[f] : starts[f + 1]] += J.T @ np.einsum("ni,nik->nk", u, shared)
-        middle += together @ together.T
-    for a, (f, _) in enumerate(parts):
-        for b, (g, _) in enumerate(parts[: a + 1]):
-            block = (np.einsum("ij,ij->i", moved[a], moved[b])[:, None] * rows[a]).T @ rows[b]
-            middle[starts[f] : starts[f + 1], starts[g] : starts[g + 1]] += block
-            if a != b:
-                middle[starts[g] : starts[g + 1], starts[f] : starts[f + 1]] += block.T
-    outer = np.zeros_like(middle)
-    for f, fit in enumerate(fits):
-        part = slice(starts[f], starts[f + 1])
-        outer[part, part] = _inverse(fit)
-        middle[part, part] += _of_prior(fit)
-    told = np.zeros_like(middle)
-    for f, fit in enumerate(fits):
-        part = slice(starts[f], starts[f + 1])
-        told[part, part] = as_told(fit)
-    return told @ outer @ middle @ outer @ told.T
+    middle = np.zeros((starts[-1], *moved[0].shape))
+    together = np.zeros((starts[-1], 0 if shared is None else shared.shape[2]))
+    for (f, k), by_pose in zip(parts, moved, strict=True):
+        fit, part = fits[f], slice(starts[f], starts[f + 1])
+        J = fit.group.slopes(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
+        middle[part] += np.einsum("np,na->pna", J, by_pose)
+        if shared is not None:
+            u = fit.group.chains[k].by_pose(fit.group.numbers(k, fit.x))[0]
+            together[part] += J.T @ np.einsum("ni,nik->nk", u, shared)
+    priors = np.asarray(block_diag(*[_of_prior(fit) for fit in fits]))
+    inverses = [as_told(fit) @ inverse_of(fit.minimum, fit.group.scale[fit.group.free]) for fit in fits]
+    inverse = np.asarray(block_diag(*inverses))
+    return spread_by(inverse, middle.reshape(starts[-1], -1), together, priors)
+
+
+def spread_by(inverse: np.ndarray, *moved: np.ndarray) -> np.ndarray:
+    """Covariance (n, n) of numbers; moved: what each independent error, of one deviation, adds to J'WWe, in columns."""
+    half = inverse @ np.hstack(moved)
+    return half @ half.T
+
+
+def inverse_of(minimum: Minimum, scale: np.ndarray) -> np.ndarray:
+    """(J'J)^-1 in the directions that were moved."""
+    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
+    return held.T @ held
 
 
 def _moved(
@@ -151,7 +154,7 @@ def _moved(
     shared: np.ndarray | None,
 ) -> list[np.ndarray]:
     """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
-    turned = [fits[f].group.chains[k].by_pose(fits[f].x[fits[f].group.places[k]]) for f, k in parts]
+    turned = [fits[f].group.chains[k].by_pose(fits[f].group.numbers(k, fits[f].x)) for f, k in parts]
     worse = np.ones(1)
     if spreads is not None:
         worse = np.sqrt(np.trace(spreads @ spreads, axis1=1, axis2=2) / 3)[:, None]
@@ -169,26 +172,11 @@ def _moved(
     return [c * np.hstack([s * u, a * w]) for c, (u, w) in zip(factors, turned, strict=True)]
 
 
-def _slopes(fit: Fit, k: int) -> np.ndarray:
-    """Weighted slopes (N, free) of a link."""
-    J = fit.group.slopes(fit.x, k)
-    return J if fit.weights is None else J * (fit.weights**2)[:, None]
-
-
-def _inverse(fit: Fit) -> np.ndarray:
-    """(J'J)^-1 in the directions that were moved."""
-    minimum = fit.minimum
-    scale = fit.group.scale[fit.group.free]
-    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
-    return held.T @ held
-
-
 def _of_prior(fit: Fit) -> np.ndarray:
-    """What the rows of the prior, the last of the slopes, add to the middle."""
+    """What the rows of the prior, the last of the slopes, add to J'e, in columns."""
     count = len(fit.group.prior)
     rows = fit.minimum.slopes[len(fit.minimum.slopes) - count :] / fit.group.scale[fit.group.free]
-    freedom = max(1, fit.count - fit.minimum.rank)
-    return rows.T @ rows * (fit.minimum.cost / freedom)
+    return rows.T * np.sqrt(fit.minimum.cost / max(1, fit.count - fit.minimum.rank))
 
 
 def as_told(fit: Fit) -> np.ndarray:
@@ -201,8 +189,8 @@ def as_told(fit: Fit) -> np.ndarray:
     return whole[np.ix_(fit.group.free, fit.group.free)]
 
 
-def undetermined(fit: Fit) -> tuple[str, ...]:
-    """Names of the numbers that take part in directions that data do not hold."""
-    lost = fit.minimum.directions[fit.minimum.rank :] @ as_told(fit).T
-    part = np.abs(lost).max(axis=0, initial=0.0)
-    return tuple(n for n, share in zip(fit.free_names, part, strict=True) if share > MOVED)
+def undetermined(minimum: Minimum, names: Sequence[str], told: np.ndarray | None = None) -> tuple[str, ...]:
+    """Names of the numbers that take part in directions that data do not hold; told: as of `as_told`."""
+    lost = minimum.directions[minimum.rank :]
+    part = np.abs(lost if told is None else lost @ told.T).max(axis=0, initial=0.0)
+    return tuple(n for n, share in zip(names, part, strict=True) if share > MOVED)

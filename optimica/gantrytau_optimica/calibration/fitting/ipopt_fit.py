@@ -6,6 +6,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import block_diag
 
 from gantrytau import SolveError
 from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, read_constraints
@@ -48,16 +49,29 @@ def solve(fit: Fit) -> Fit:
     solver = _solver(rows, unknown, held, bool(group.arms), OPTIONS)
     start = np.linalg.solve(steps, group.x[free] - fit.x[free])
     start[fit.minimum.rank :] = 0.0
-    found: Any = solver(x0=start, lbg=0.0, ubg=0.0)
-    stats = solver.stats()
-    if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
-        raise SolveError(
-            f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a "
-            "minimum; take method='gauss-newton', or start='linear'"
-        )
+    found, steps_taken = _solved(
+        solver, "a minimum; take method='gauss-newton', or start='linear'", x0=start, lbg=0.0, ubg=0.0
+    )
     numbers = group.x.copy()
     numbers[free] = fit.x[free] + steps @ np.array(found["x"]).ravel()
-    return replace(fit, minimum=_minimum(fit, numbers, int(stats["iter_count"])))
+    left = problem(group, fit.weights, noise_of(fit.minimum, group))
+    J = left.slopes(numbers)[:, group.free]
+    _, singular, directions = np.linalg.svd(J, full_matrices=False)
+    rank = fit.minimum.rank
+    return replace(
+        fit, minimum=Minimum(numbers, left.errors(numbers), J, singular, directions, rank, steps_taken, True)
+    )
+
+
+def _solved(solver: ca.Function, expected: str, **given: Any) -> tuple[Any, int]:
+    """What Ipopt found, and in how many iterations; SolveError where it is no minimum."""
+    found, stats = solver(**given), solver.stats()
+    if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
+        raise SolveError(
+            f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected "
+            f"{expected}"
+        )
+    return found, int(stats["iter_count"])
 
 
 def _residuals(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
@@ -105,20 +119,15 @@ def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
     low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
     options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
     solver = _solver(rows, unknown, kept, bool(group.arms), options)
-    found: Any = solver(x0=0.0, lbg=low, ubg=high)
-    stats = solver.stats()
-    if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
-        raise SolveError(
-            f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a "
-            "minimum that keeps the constraints; look whether they contradict each other"
-        )
+    expected = "a minimum that keeps the constraints; look whether they contradict each other"
+    found, iterations = _solved(solver, expected, x0=0.0, lbg=low, ubg=high)
     numbers = group.x.copy()
     numbers[free] = begin + steps @ np.array(found["x"]).ravel()
     value = np.array(found["g"]).ravel()
     active = np.minimum(value - low, high - value) < AT_LIMIT
     slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))
     slopes = slopes @ np.linalg.inv(steps) * group.scale[free]
-    return [_constrained(whole, numbers, slopes[active], int(stats["iter_count"]))]
+    return [_constrained(whole, numbers, slopes[active], iterations)]
 
 
 def _steps(fit: Fit, noise: float) -> np.ndarray:
@@ -134,8 +143,7 @@ def _steps(fit: Fit, noise: float) -> np.ndarray:
 
 def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> Fit:
     """The fit at x, which moves only across the slopes of the constraints it keeps."""
-    weights = None if fit.weights is None else [fit.weights] * len(fit.group.chains)
-    found = problem(fit.group, weights, noise_of(fit.minimum, fit.group))
+    found = problem(fit.group, fit.weights, noise_of(fit.minimum, fit.group))
     J = found.slopes(x)[:, fit.group.free]
     _, sizes, rows = np.linalg.svd(kept, full_matrices=True)
     across = rows[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
@@ -148,53 +156,30 @@ def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> 
 def _merged(fits: Sequence[Fit]) -> Fit:
     """Several fits as one, whose numbers stand one after another."""
     starts = np.cumsum([0, *(len(fit.x) for fit in fits)])
+    groups, minima = [fit.group for fit in fits], [fit.minimum for fit in fits]
+    placed = list(zip(groups, starts[:-1].tolist(), strict=True))
     group = Group(
-        tuple(chain for fit in fits for chain in fit.group.chains),
-        tuple(
-            places + start
-            for fit, start in zip(fits, starts[:-1], strict=True)
-            for places in fit.group.places
-        ),
-        tuple(name for fit in fits for name in fit.group.names),
-        np.concatenate([fit.group.x for fit in fits]),
-        np.concatenate([fit.group.free for fit in fits]),
-        np.concatenate([fit.group.scale for fit in fits]),
-        {
-            i + int(start): v
-            for fit, start in zip(fits, starts[:-1], strict=True)
-            for i, v in fit.group.prior.items()
-        },
-        fits[0].group.noise,
-        fits[0].group.tape,
+        tuple(chain for group in groups for chain in group.chains),
+        tuple(places + start for group, start in placed for places in group.places),
+        tuple(name for group in groups for name in group.names),
+        np.concatenate([group.x for group in groups]),
+        np.concatenate([group.free for group in groups]),
+        np.concatenate([group.scale for group in groups]),
+        {i + start: v for group, start in placed for i, v in group.prior.items()},
+        groups[0].noise,
+        groups[0].tape,
     )
-    held, lost = [], []
-    ends = np.cumsum([0, *(int(fit.group.free.sum()) for fit in fits)])
-    for fit, first in zip(fits, ends[:-1], strict=True):
-        wide = np.zeros((len(fit.minimum.directions), int(ends[-1])))
-        wide[:, first : first + int(fit.group.free.sum())] = fit.minimum.directions
-        held.append(wide[: fit.minimum.rank])
-        lost.append(wide[fit.minimum.rank :])
-    rank = sum(fit.minimum.rank for fit in fits)
-    singular = np.concatenate([fit.minimum.singular[: fit.minimum.rank] for fit in fits])
+    held = np.asarray(block_diag(*[m.directions[: m.rank] for m in minima]))
+    lost = np.asarray(block_diag(*[m.directions[m.rank :] for m in minima]))
+    singular = np.concatenate([*(m.singular[: m.rank] for m in minima), np.zeros(len(lost))])
     minimum = Minimum(
-        np.concatenate([fit.x for fit in fits]),
-        np.concatenate([fit.minimum.errors for fit in fits]),
-        np.zeros((0, int(ends[-1]))),
-        np.concatenate([singular, np.zeros(sum(map(len, lost)))]),
-        np.vstack([*held, *lost]),
-        rank,
-        max(fit.minimum.iterations for fit in fits),
-        all(fit.minimum.success for fit in fits),
+        np.concatenate([m.x for m in minima]),
+        np.concatenate([m.errors for m in minima]),
+        np.zeros((0, len(singular))),
+        singular,
+        np.vstack([held, lost]),
+        len(held),
+        max(m.iterations for m in minima),
+        all(m.success for m in minima),
     )
     return Fit(group, minimum, max(fit.smallest for fit in fits), fits[0].weights)
-
-
-def _minimum(fit: Fit, x: np.ndarray, iterations: int) -> Minimum:
-    """The record of the minimum at x, with slopes as Gauss-Newton keeps them."""
-    group, old = fit.group, fit.minimum
-    noise = noise_of(old, group)
-    weights = None if fit.weights is None else [fit.weights] * len(group.chains)
-    found = problem(group, weights, noise)
-    J = found.slopes(x)[:, group.free]
-    _, singular, directions = np.linalg.svd(J, full_matrices=False)
-    return Minimum(x, found.errors(x), J, singular, directions, old.rank, iterations, True)

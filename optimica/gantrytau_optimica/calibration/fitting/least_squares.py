@@ -1,6 +1,5 @@
 """The least squares of links that share numbers: closure errors, priors and a tape measure."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,12 +39,9 @@ class Problem:
         return np.vstack(blocks) * self.group.scale
 
 
-def problem(group: Group, weights: Sequence[np.ndarray] | None = None, noise: float = 0.0) -> Problem:
-    """The least squares of a group; weights: (N,) for each chain; noise of a closure error, for the prior."""
-    condensed = tuple(
-        condense(c, None if weights is None else weights[k]) for k, c in enumerate(group.chains)
-    )
-    return Problem(group, condensed, noise)
+def problem(group: Group, weights: np.ndarray | None = None, noise: float = 0.0) -> Problem:
+    """The least squares of a group; weights: of the poses, (N,); noise of a closure error, for the prior."""
+    return Problem(group, tuple(condense(c, weights) for c in group.chains), noise)
 
 
 def minimise(found: "Problem | Taped", x: np.ndarray, smallest: float = 0.0, **along: Any) -> Minimum:

@@ -75,7 +75,7 @@ def fit_group(
     decided there, and moves on without the tape.
     """
     x = group.x if begin is None else begin
-    found = problem(group, None if weights is None else [weights] * len(group.chains))
+    found = problem(group, weights)
     if group.noise is not None and smallest is None:
         limit = group.noise / group.tape * (1 - 1e-6)  # a prior as wide as a tape measure counts
         return Fit(group, minimise(replace(found, noise=group.noise), x, limit), limit, weights)
@@ -199,39 +199,43 @@ def with_prior(groups: Sequence[Group], expected: Prior) -> list[Group]:
     given: by name of a number, of a vector, or of the last part of these for all links: a deviation, or (value,
     deviation). Raises ModelError for names that are not identified and deviations that are not above 0.
     """
-    prior = expected.given
-    if prior is None:
-        return list(groups)
-    if not isinstance(prior, Mapping):
+    free = {n: float(x) for g in groups for n, x, each in zip(g.names, g.x, g.free, strict=True) if each}
+    found = read_prior(expected.given, free | {n: x for n, x in expected.nominal.items() if n in free})
+    return [
+        replace(g, prior=dict(g.prior) | {i: found[n] for i, n in enumerate(g.names) if n in found})
+        for g in groups
+    ]
+
+
+def read_prior(prior: Mapping[str, Any] | None, start: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Value and deviation by name of a number; start: of all that are free, where a prior holds those without a value."""
+    if not isinstance(prior, Mapping | None):
         raise ModelError(
             f"calibrate: found prior={prior!r}, expected a dict as {{'arms[1].links[0].plate_offset': 0.001}}, deviations "
             "in m by name",
             argument="prior",
         )
-    known = {n for g in groups for n, free in zip(g.names, g.free, strict=True) if free}
-    found = [dict(g.prior) for g in groups]
-    for name, given in prior.items():
-        matches = [n for n in known if _is_called(n, name)]
+    found: dict[str, tuple[float, float]] = {}
+    for name, given in (prior or {}).items():
+        matches = [n for n in start if _is_called(n, name)]
         if not matches:
             raise ModelError(
-                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, sorted(known))}",
+                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, sorted(start))}",
                 argument="prior",
             )
         value, deviation = given if isinstance(given, tuple) else (None, given)
-        for group, mine in zip(groups, found, strict=True):
-            for i, n in enumerate(group.names):
-                if n in matches:
-                    k = int(n[-2]) if n.endswith("]") else 0
-                    mine[i] = (
-                        expected.nominal.get(n, group.x[i]) if value is None else _element(value, k),
-                        _positive(name, deviation, k),
-                    )
-    return [replace(g, prior=mine) for g, mine in zip(groups, found, strict=True)]
+        for n in matches:
+            k = [m for m in matches if _vector(m) == _vector(n)].index(n)
+            found[n] = start[n] if value is None else _element(value, k), _positive(name, deviation, k)
+    return found
 
 
 def _is_called(element: str, name: str) -> bool:
-    vector = element.rsplit("[", 1)[0] if element.endswith("]") else element
-    return name in (element, vector, vector.rsplit(".", 1)[-1])
+    return name in (element, _vector(element), _vector(element).rsplit(".", 1)[-1])
+
+
+def _vector(element: str) -> str:
+    return element.rsplit("[", 1)[0] if element.endswith("]") else element
 
 
 def _element(value: Any, k: int) -> float:

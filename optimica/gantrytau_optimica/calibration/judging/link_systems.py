@@ -14,7 +14,9 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.fitting.covariance import pose_noise
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
+from gantrytau_optimica.fitting.diagnostics import ResidualSeries
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,3 +98,43 @@ def freedom(systems: Sequence[LinkSystem]) -> int:
 def variance(systems: Sequence[LinkSystem]) -> float:
     """Of a closure error that numbers leave, m2."""
     return sum(float(np.sum(one.left**2)) for one in systems) / max(1, freedom(systems))
+
+
+def closure_series(fits: Sequence[Fit], data: Measurements, rows: np.ndarray) -> list[ResidualSeries]:
+    """Residual series of the links at the fitted poses; links that share numbers are one quantity; rows: of the data."""
+    systems = link_systems(fits, data)
+    noise = _told(systems, data)
+    away = systems[0].certainty[:, 0] * data.distances
+    signals = {f"q of q{k + 1}": q - q.mean() for k, q in enumerate(data.q.T)}
+    found = []
+    for fit, one in zip(fits, systems, strict=True):
+        links = [link.name for link in fit.group.chains]
+        name = f"the closure of {' to '.join(dict.fromkeys((links[0], links[-1])))}"
+        for k, link in enumerate(links):
+            told = None if noise is None else noise.pop(0)
+            groups = {"link": np.full(len(data), link)} if len(links) > 1 else {}
+            found.append(
+                ResidualSeries(
+                    name, one.errors[:, k], away, told, one.numbers[:, k], signals, groups, rows, link
+                )
+            )
+    return found
+
+
+def _told(systems: Sequence[LinkSystem], data: Measurements) -> list[np.ndarray] | None:
+    """Told deviations of the closure errors of each link, (N,) in m: by the covariance of positions, less the shared part
+    that numbers take up, and by the estimated noise of orientations.
+    """
+    if data.spreads is None or data.deviation is None:
+        return None
+    links = [(one, k) for one in systems for k in range(one.errors.shape[1])]
+    seen = np.stack([np.einsum("nj,njk->nk", one.place[:, k], data.spreads) for one, k in links], axis=1)
+    turn = np.stack([one.turn[:, k] for one, k in links], axis=1)
+    errors = np.column_stack([one.errors[:, k] for one, k in links])
+    freedom = np.array([len(data) - one.known.shape[1] / one.errors.shape[1] for one, _ in links])
+    angle = pose_noise(errors, seen, turn, np.maximum(freedom, 1.0))[1]
+    squares = data.deviation**2 * np.sum(seen**2, axis=2) + angle**2 * np.sum(turn**2, axis=2)
+    if data.shared is not None:
+        common = [one.across(np.einsum("nmj,njk->nmk", one.place, data.shared)) for one in systems]
+        squares += np.concatenate([np.sum(each**2, axis=2) for each in common], axis=1)
+    return list(np.sqrt(squares).T)

@@ -17,6 +17,7 @@ import numpy as np
 from gantrytau_optimica.calibration.judging.link_systems import LinkSystem, freedom, variance
 from gantrytau_optimica.calibration.judging.slips import SMOOTHER, Slip, for_each_link, smooth_functions
 
+Kind = Literal["position", "turn", "actuator", "jump", "period"]
 CHANCE = 1e-6  # of a gain as large without a cause
 SHARE = 0.5  # of the squares, from which on a cause is the main one
 ENDS = 5  # rows at the least on each side of a jump: fewer are outliers
@@ -39,7 +40,7 @@ class OrderEffect:
     the places of the tool, so that an error of the model may look the same.
     """
 
-    kind: Literal["position", "turn", "actuator", "jump", "period"]
+    kind: Kind
     course: np.ndarray
     variance: float
     column: int = 0
@@ -103,7 +104,7 @@ def _follows(r: np.ndarray) -> bool:
 class _Cause:
     """Columns (N, m, k) for each system, from k numbers the course (N, 3 or 1); trials: how many there are of its kind."""
 
-    kind: Literal["position", "turn", "actuator", "jump", "period"]
+    kind: Kind
     columns: list[np.ndarray]
     course: Callable[[np.ndarray], np.ndarray]
     column: int = 0
@@ -153,11 +154,7 @@ def _period(systems: Sequence[LinkSystem], rows: np.ndarray) -> _Cause:
 
 
 def _off_in(
-    systems: Sequence[LinkSystem],
-    weights: np.ndarray,
-    kind: Literal["jump", "period"],
-    period: int,
-    trials: int,
+    systems: Sequence[LinkSystem], weights: np.ndarray, kind: Kind, period: int, trials: int
 ) -> _Cause:
     """Positions that are off in some rows, weights 1 of (N,)."""
     columns = [one.place * weights[:, None, None] for one in systems]

@@ -65,8 +65,7 @@ def pulls(fit: Fit, constraints: Sequence[ParameterConstraint] = ()) -> list[Pul
 def _by_data_alone(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """The step of the free numbers to where data want them, (n,), by tape where they want nothing, and its covariance."""
     group, free = fit.group, fit.group.free
-    weights = None if fit.weights is None else [fit.weights] * len(group.chains)
-    data = problem(group, weights, 0.0)  # rows of the prior are zero
+    data = problem(group, fit.weights)  # rows of the prior are zero
     e, J = data.errors(fit.x), data.slopes(fit.x)[:, free]
     rest = e - J @ np.linalg.lstsq(J, e, rcond=1e-10)[0]
     s = max(float(np.sqrt(rest @ rest / max(1, fit.count - fit.minimum.rank))), LEAST)

@@ -9,6 +9,7 @@ from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.judging.causes import ordered, pulled, scaled
 from gantrytau_optimica.calibration.judging.device_frames import frame_of, moved_arms
+from gantrytau_optimica.calibration.judging.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.judging.plausibility import (
     NEAR,
@@ -28,7 +29,7 @@ from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
 STILL = 1e-4  # m, over which a cart must move to be calibrated
-SHARED = 2.0  # times what links show, from which on foretold errors of positions are shared by poses
+NOISE = ("noise larger", "noise smaller")
 MISFIT, REFUSED = 1e-3, 1e-2  # m, of typical closure errors that no parameters explain: told, refused
 EXPLAINED = 1e-3  # m, within which links close once a mistake is undone, unless noise is larger
 
@@ -183,16 +184,7 @@ def judged(found: FittedRods) -> list[Finding]:
     seen = found.suspicion
     findings = _mistaken(found, seen)
     others = rows_of(seen.rows, without=rows_of(*(f.rows for f in findings)))
-    if others.size:
-        one = len(others) == 1
-        advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
-        if found.loss == "robust":
-            advice = f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error"
-        words = (
-            f"{rows_in_words(others, len(found.measurements))} {agreeing(others, 'close')} worse than {OUTLIER:g} standard "
-            f"deviations; {advice}"
-        )
-        findings.append(Finding("outliers", others, words))
+    findings += outliers(found, others, f"close worse than {OUTLIER:g} standard deviations")
     others = found.without_strays()
     findings += ordered(others)
     return [
@@ -202,24 +194,34 @@ def judged(found: FittedRods) -> list[Finding]:
         *scaled(found),
         *_far(others),
         *_in_doubt(found),
+        *not_converged(found),
         *_undetermined(others),
-        *_shared(found),
+        *(f for f in found.diagnostics.findings if f.kind in NOISE),
     ]
 
 
-def _shared(found: FittedRods) -> Iterator[Finding]:
-    """Errors of positions that their covariance foretells and that closures do not show, as poses share them."""
-    data = found.measurements.select(found.rows)
-    if data.covariance is None:
+def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Finding]:
+    """The finding on outliers; said: how they are off, the verb first."""
+    if not rows.size:
         return
-    foretold = float(np.sqrt(np.nanmedian(np.trace(data.covariance, axis1=1, axis2=2))))
-    left = np.sqrt(3) * found.noise
-    if foretold > SHARED * left:
-        words = (
-            f"positions are foretold to be off by {1e3 * foretold:.2g} mm, of which links show {1e3 * left:.2g} mm: the "
-            "rest is shared by neighbouring poses, as by lenses or a scale, and moves the calibrated tool with it"
+    one, (verb, *words) = len(rows) == 1, said.split()
+    advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
+    if found.loss == "robust":
+        advice = (
+            f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error"
         )
-        yield Finding("shared", found.rows, words)
+    where = rows_in_words(rows, len(found.measurements))
+    yield Finding("outliers", rows, f"{where} {agreeing(rows, verb)} {' '.join(words)}; {advice}")
+
+
+def not_converged(found: FittedNumbers) -> Iterator[Finding]:
+    """The finding on a fit without convergence."""
+    if not found.success:
+        words = (
+            "the fit did not converge; its numbers are those of the last step; measure more poses, or give "
+            "prior={name: deviation}"
+        )
+        yield Finding("not converged", found.rows, words)
 
 
 def _far(found: FittedRods) -> Iterator[Finding]:
@@ -267,12 +269,6 @@ def _in_doubt(found: FittedRods) -> Iterator[Finding]:
         left = f"{agreeing(lost, 'they are')} left out of the error"
         words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; {left}"
         yield Finding("no pose", lost, words)
-    if not found.success:
-        words = (
-            "the fit did not converge; its numbers are those of the last step; measure more poses, or give "
-            "prior={name: deviation}"
-        )
-        yield Finding("not converged", found.rows, words)
 
 
 def _undetermined(found: FittedRods) -> Iterator[Finding]:

@@ -8,41 +8,31 @@ import numpy as np
 
 from gantrytau import Model, ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.pose_residuals import PoseResiduals, fitted, started
+from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, started
+from gantrytau_optimica.calibration.fitting.rod_fit import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
-from gantrytau_optimica.calibration.judging.verdicts import check_count, usable_rows
+from gantrytau_optimica.calibration.judging.verdicts import check_count, not_converged, outliers, usable_rows
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
-REMEDIES = {
-    "trend": "a parameter that is not named, a bent guideway, an eccentric axis or a gear; name more parameters",
-    "drift": "the device or the robot warmed up, settled or gave way; wait until they stand, and measure again",
-    "not white": "poses that follow each other err alike: a parameter that is not named, or the device drifts",
-}
 
 
-@dataclass(frozen=True)
-class AskedByName(Record):
-    """What is asked for: names of parameters; joints: columns of q, None for those that are driven; prior, loss, frame: as
-    of `calibrate`.
-    """
+@dataclass(frozen=True, eq=False)
+class Usable(Record):
+    """Tool function of the robot, rows of the measurements that take part, and findings on these."""
 
-    parameters: Sequence[str]
-    joints: Sequence[str] | None
-    prior: Mapping[str, Any] | None
-    loss: str
-    frame: str
+    tool: ToolFunction
+    rows: np.ndarray
+    findings: list[Finding]
 
 
 def usable(
-    robot: Model, measurements: Measurements, asked: AskedByName
-) -> tuple[ToolFunction, np.ndarray, list[Finding]]:
-    """The function of the robot, rows that it can be fitted to, and what was noticed of the measurements."""
-    tool = tool_function(robot, asked.parameters, asked.joints, measurements.R is not None)
+    robot: Model, measurements: Measurements, parameters: Sequence[str], joints: Sequence[str] | None
+) -> Usable:
+    """Tool function and usable rows of a robot; joints: columns of q, None for the driven ones."""
+    tool = tool_function(robot, parameters, joints, measurements.R is not None)
     if measurements.q.shape[1] != len(tool.joints):
         raise ModelError(
             f"calibrate: found measurements of {measurements.q.shape[1]} joints for {tool.dae.name}, expected "
@@ -57,53 +47,39 @@ def usable(
         lost = rows[~there]
         words = f"the nominal robot has no pose at q of {rows_in_words(lost)}; {agreeing(lost, 'they are')} left out"
         findings.append(Finding("no pose", lost, words))
-    return tool, rows[there], findings
+    return Usable(tool, rows[there], findings)
 
 
 def calibrate_by_names(
     robot: Model,
     measurements: Measurements,
-    asked: AskedByName,
-    parted: tuple[np.ndarray, np.ndarray],
-    known: tuple[ToolFunction, list[Finding]],
+    known: Usable,
+    split: tuple[np.ndarray, np.ndarray],
+    *,
+    prior: Mapping[str, Any] | None,
+    loss: str,
+    frame: str,
 ) -> NamedCalibration:
-    """The calibration; parted: rows that are fitted and held out; known: as of `usable`."""
-    (tool, findings), (rows, held_out) = known, parted
-    data = measurements.select(rows)
-    check_count(
-        (len(tool.names) + 6 * (asked.frame == "fitted")) // (6 if tool.turning else 3) + 1, rows, findings
-    )
-    residuals, x = started(tool, data, asked.frame == "fitted")
-    residuals = replace(residuals, prior=_prior(residuals, asked.prior, x))
-    residuals, minimum, noise = fitted(residuals, x, asked.loss == "robust")
+    """The calibration; split: rows that are fitted and held out; prior, loss, frame: as of `calibrate`."""
+    tool, (rows, held_out) = known.tool, split
+    free = len(tool.names) + 6 * (frame == "fitted")
+    check_count(free // (6 if tool.turning else 3) + 1, rows, known.findings)
+    residuals, x = started(tool, measurements.select(rows), frame == "fitted")
+    told = read_prior(prior, dict(zip(residuals.names, x.tolist(), strict=True)))
+    held = {k: told[name] for k, name in enumerate(residuals.names) if name in told}
+    residuals, minimum, noise = fitted(replace(residuals, prior=held), x, loss == "robust")
     found = NamedCalibration(
-        robot, measurements, residuals, minimum, noise, rows, held_out, asked.loss, asked.frame
+        given=robot,
+        measurements=measurements,
+        residuals=residuals,
+        minimum=minimum,
+        noise=noise,
+        rows=rows,
+        held_out=held_out,
+        loss=loss,
+        frame=frame,
     )
-    return replace(found, noise=_noise(found)).with_findings([*findings, *_judged(found)])
-
-
-def _prior(
-    residuals: PoseResiduals, given: Mapping[str, Any] | None, x: np.ndarray
-) -> dict[int, tuple[float, float]]:
-    found: dict[int, tuple[float, float]] = {}
-    for name, told in (given or {}).items():
-        those = [k for k, n in enumerate(residuals.names) if name in (n, n.rpartition("[")[0])]
-        if not those:
-            raise ModelError(
-                f"calibrate: prior for '{name}', which is not identified{did_you_mean(name, residuals.names)}",
-                argument="prior",
-            )
-        values, deviation = told if isinstance(told, tuple) else (x[those], told)
-        if not np.all(np.asarray(deviation, dtype=float) > 0):
-            raise ModelError(
-                f"calibrate: found the deviation {deviation!r} for '{name}' in prior, expected one above 0",
-                argument="prior",
-            )
-        for k, value, size in zip(
-            those, *np.broadcast_arrays(np.atleast_1d(values), deviation), strict=False
-        ):
-            found[k] = float(value), float(size)
-    return found
+    return replace(found, noise=_noise(found)).with_findings([*known.findings, *_judged(found)])
 
 
 def _noise(found: NamedCalibration) -> float:
@@ -122,20 +98,8 @@ def _noise(found: NamedCalibration) -> float:
 
 
 def _judged(found: NamedCalibration) -> list[Finding]:
-    """What is doubtful after a fit: stray poses, numbers that data do not hold, and what else is left."""
-    findings, x, rows = [], found.minimum.x, found.rows
-    off = found.stray_rows
-    if off.size:
-        advice = (
-            "had little weight, left out of the error"
-            if found.loss == "robust"
-            else "look there, or take loss='robust'"
-        )
-        words = f"{rows_in_words(off, len(found.measurements))} {agreeing(off, 'lie')} off by more than noise; {advice}"
-        findings.append(Finding("outliers", off, words))
-    if not found.success:
-        words = "the fit did not converge; its numbers are those of the last step; start nearer, or name fewer parameters"
-        findings.append(Finding("not converged", rows, words))
+    """Findings on a fit: outliers, convergence, undetermined numbers, size and structure of the residuals."""
+    findings = [*outliers(found, found.stray_rows, "lie off by more than noise"), *not_converged(found)]
     if found.undetermined:
         told = [
             f"{name} follows from {', '.join(others)}"
@@ -144,32 +108,13 @@ def _judged(found: NamedCalibration) -> list[Finding]:
             for name, others in found.dependent.items()
         ]
         words = f"data do not tell all numbers apart (rank {found.rank} of {len(found.names)}): {'; '.join(told)}; "
-        findings.append(
-            Finding("undetermined", rows, f"{words}they stay near their start values; {found.advice}")
-        )
-    typical = float(np.median(np.linalg.norm(found.residuals.poses(x)[:, :3], axis=1)))
+        words += f"they stay near their start values; {found.advice}"
+        findings.append(Finding("undetermined", found.rows, words))
+    typical = float(np.median(np.linalg.norm(found.residuals.poses(found.minimum.x)[:, :3], axis=1)))
     if typical > FAR:
         words = (
             f"the tool is {typical * 1e3:.3g} mm from where it was measured, with the best parameters; look at order, units "
             "and signs of the columns of q and r, and whether more parameters differ from nominal values"
         )
-        findings.append(Finding("misfit", rows, words))
-    return [*findings, *diagnosed(found).findings]
-
-
-def diagnosed(found: NamedCalibration) -> Diagnostics:
-    """What is left of the coordinates, beside stray poses."""
-    residuals, x = found.residuals, found.minimum.x
-    left, J = (
-        residuals.poses(x) * residuals.weights[:, None],
-        residuals.slopes(x) * residuals.weights[:, None, None],
-    )
-    left[np.isin(found.rows, found.stray_rows)] = np.nan
-    signals = {
-        f"q of {n}": q - q.mean() for n, q in zip(residuals.tool.joints, residuals.data.q.T, strict=True)
-    }
-    series = [
-        ResidualSeries(name, left[:, k], jacobian=J[:, k], signals=signals, rows=found.rows)
-        for k, name in enumerate(("x", "y", "z"))
-    ]
-    return diagnose(series, remedies=REMEDIES)
+        findings.append(Finding("misfit", found.rows, words))
+    return [*findings, *found.diagnostics.findings]

@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau import Description
 from gantrytau.describing.described import Listing
 from gantrytau.describing.short_values import cut
-from gantrytau_optimica.calibration.rods.error_models import COMMON
+from gantrytau_optimica.calibration.rods.error_models import COMMON, shared_name
 
 COLUMNS = ("name", "value", "standard deviation", "unit")
 LONG = 200  # letters of a list of names
@@ -41,15 +41,10 @@ def _row(found: Any, name: str, deviations: Mapping[str, float]) -> tuple[str, s
     """A number or a vector, as many digits as are known of a length in um."""
     value = np.asarray(found.parameters[name], dtype=float)
     elements = [name] if value.ndim == 0 else [f"{name}[{k}]" for k in range(value.size)]
-    sure = [deviations.get(_alias(e, deviations)) for e in elements]
+    sure = [deviations.get(shared_name(e, deviations)) for e in elements]
     told = [f"{x:.7g}" for x in np.atleast_1d(value).ravel()]
     known = [one for one in sure if one is not None]
     return name, _joined(told), _joined([f"{one:.2g}" for one in known]), _unit(name)
-
-
-def _alias(name: str, deviations: Mapping[str, float]) -> str:
-    """The name under which a deviation stands: a direction may be common to all arms."""
-    return name if name in deviations or COMMON not in name else name[name.index(COMMON) :]
 
 
 def _joined(texts: list[str]) -> str:

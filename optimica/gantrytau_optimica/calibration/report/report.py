@@ -10,28 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import Description, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.residual_tests import residual_tests
+from gantrytau_optimica.calibration.report.described_calibration import calibration_described
 from gantrytau_optimica.calibration.report.report_page import html_report
+from gantrytau_optimica.calibration.report.residual_tests import residual_tests
 
 BINS = 24
-OTHERS = (
-    ".pdf",
-    ".csv",
-    ".txt",
-    ".md",
-    ".xlsx",
-    ".xls",
-    ".docx",
-    ".doc",
-    ".odt",
-    ".xml",
-    ".toml",
-    ".png",
-    ".svg",
-)
+OTHERS = (".pdf", ".csv", ".txt", ".md", ".xlsx", ".xls", ".docx", ".doc", ".odt", ".xml", ".toml")
+PICTURES = (".png", ".svg")
 LISTED = 2000  # poses, of more the worst
 
 
@@ -191,7 +179,7 @@ def write_report(found: Any, path: Path, about: About | None = None) -> Path:
 
     Raises ModelError for names that end in that of another format, and for what cannot be written.
     """
-    if path.suffix.lower() in OTHERS:
+    if path.suffix.lower() in OTHERS + PICTURES:
         raise ModelError(
             f"report: found the name '{path.name}', expected one that ends in .html, for a page with a .json beside it; "
             "print the page from a browser for other formats"
@@ -226,3 +214,18 @@ def write_report(found: Any, path: Path, about: About | None = None) -> Path:
             if temporary.exists():
                 temporary.unlink()
     return page
+
+
+class Reported:
+    """What shows a calibration: `describe`, and a report on file."""
+
+    def __describe__(self, name: str = "") -> Description:
+        return calibration_described(self, name)
+
+    def report(self, path: str | Path) -> Path:
+        """Write the report as one HTML page to path, and as JSON beside it (.json); returns the path of the page.
+
+        A path that ends in .json names both files too; another ending, such as .pdf, raises ModelError.
+        Errors, residual tests, parameters with deviations, covariance, principal axes of the errors, histogram.
+        """
+        return write_report(self, Path(path))

@@ -29,35 +29,32 @@ def triangle(
     r: np.ndarray,
     R: np.ndarray | None,
     scale: np.ndarray,
-    weights: np.ndarray | None = None,
     root: np.ndarray | None = None,
 ) -> np.ndarray:
     """The triangular factor F of [J S, e] over all poses, (p + 1, p + 1): F'F = [J S, e]' [J S, e].
 
-    weights: (N, m) for the squares of the rows, or None; root: (m, c) or (N, m, c), makes it F'F = [..]' root root' [..].
+    root: (m, c) or (N, m, c), makes it F'F = [..]' root root' [..].
     """
     factor = np.zeros((0, arm.count + 1))
     for start in range(0, len(q), BLOCK):
         part = slice(start, start + BLOCK)
         e, J = arm.closure(q[part], r[part], None if R is None else R[part])
         rows = np.concatenate([J * scale, e[:, :, None]], axis=2)
-        if weights is not None:
-            rows *= np.sqrt(weights[part])[:, :, None]
         if root is not None:
             rows = np.swapaxes(root if root.ndim == 2 else root[part], -1, -2) @ rows
         factor = np.linalg.qr(np.vstack([factor, rows.reshape(-1, arm.count + 1)]), mode="r")
     return np.asarray(factor)
 
 
-def half_covariance(factor: np.ndarray, spread: np.ndarray, least: float) -> tuple[np.ndarray, int]:
-    """C with C C' the covariance of the scaled unknowns in the directions that are held, and how many those are.
+def half_covariance(factor: np.ndarray, spread: np.ndarray, least: float) -> np.ndarray:
+    """C with C C' the covariance of the scaled unknowns in the directions that are held.
 
     factor: that of J S, with p columns; spread: that of root' J S, root root' the covariance of the errors of a pose;
     C = (S J'J S)^-1 spread' within the directions of singular values from `least`.
     """
     _, s, V = np.linalg.svd(factor, full_matrices=False)
     held = s >= least
-    return V[held].T @ ((V[held] @ spread.T) / s[held, None] ** 2), int(held.sum())
+    return V[held].T @ ((V[held] @ spread.T) / s[held, None] ** 2)
 
 
 def checked_poses(

@@ -13,7 +13,7 @@
 Dressler (2012), section 5.3.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -171,6 +171,11 @@ def _numbers(arm: ArmClosure) -> Iterator[str | None]:
         yield from (rod.length, rod.offset or arm.said.offset)
         if rod.plate_offset:
             yield rod.plate_offset
+
+
+def shared_name(name: str, known: Container[str] = ()) -> str:
+    """Name under which a number is known; a direction may be shared by all arms."""
+    return name if name in known or COMMON not in name else name[name.index(COMMON) :]
 
 
 def elements(name: str) -> list[str]:

@@ -13,6 +13,7 @@ from gantrytau_optimica.calibration.trust.cross_validation import CrossValidatio
 from gantrytau_optimica.fitting.finding import Finding
 
 SHOWN = 3  # combinations that are named
+MEASURE = "measure the poses that are missing, or plan again with more of them"
 NOTHING_MEASURED = 1e3  # m, noise with which poses tell nothing
 
 
@@ -58,44 +59,28 @@ def judge(
     """
     checked = found if isinstance(found, CrossValidation) else held_out(found)
     fit = checked.calibration
-    if isinstance(fit, NamedCalibration):
-        return _of_names(checked, fit, wanted)
-    where = "the fitted poses" if expected is None else "all planned poses"
-    expected = expected or expected_error(fit, tape=tape)
-    good = bool(fit.success and checked.error <= wanted and expected.error <= wanted)
-    words = (
-        f"{_validated(checked)}, {um(expected.error)} of the tool are expected over {where} by what was measured, "
-        f"{um(wanted)} were wanted"
+    named = isinstance(fit, NamedCalibration)
+    where = (
+        "at the fitted poses" if named else "over all planned poses" if expected else "over the fitted poses"
     )
+    error = float(fit.expected.mean()) if named else (expected or expected_error(fit, tape=tape)).error
+    good = bool(fit.success and checked.error <= wanted and error <= wanted)
+    words = f"{_validated(checked)}, {um(error)} of the tool are expected {where} by what was measured, "
+    words += f"{um(wanted)} were wanted"
     if not good:
-        words += "; look at the findings, measure the poses that are missing, or plan again with more of them"
-    return CalibrationVerdict(
-        good, wanted, (f"{words}.", _of_frame(fit, good, tape)), checked.error, expected.error
-    )
+        advice = "name more parameters, or measure more poses" if named else MEASURE
+        words += f"; look at the findings, {advice}"
+    return CalibrationVerdict(good, wanted, (f"{words}.", _of_frame(fit, good, tape)), checked.error, error)
 
 
-def _of_names(checked: CrossValidation, fit: NamedCalibration, wanted: float) -> CalibrationVerdict:
-    """Whether named parameters are good enough, at the poses that were fitted."""
-    expected = float(fit.expected.mean())
-    good = bool(fit.success and checked.error <= wanted and expected <= wanted)
-    words = (
-        f"{_validated(checked)}, {um(expected)} of the tool are expected at the fitted poses by what was measured, "
-        f"{um(wanted)} were wanted{'' if good else '; look at the findings, name more parameters, or measure more poses'}."
-    )
-    base = (
-        "Poses were measured in the base of the robot."
-        if fit.frame == "base"
-        else (
-            "Coordinates of the base follow by frame.R and frame.t, which were fitted beside the parameters."
-        )
-    )
-    return CalibrationVerdict(good, wanted, (words, base), checked.error, expected)
-
-
-def _of_frame(found: Calibration, good: bool, tape: float) -> str:
+def _of_frame(found: Calibration | NamedCalibration, good: bool, tape: float) -> str:
     """What a verdict means for coordinates in the base of the robot."""
     if found.frame == "base":
         return "Poses were measured in the base of the robot: its coordinates are as good as this."
+    if isinstance(found, NamedCalibration):
+        return (
+            "Coordinates of the base follow by frame.R and frame.t, which were fitted beside the parameters."
+        )
     holds = "This is good up to a frame" if good else "This holds up to a frame"
     if found.motion is None:
         return (

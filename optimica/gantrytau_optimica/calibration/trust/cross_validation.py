@@ -11,7 +11,7 @@ from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.judging.fitted_rods import mean_by_worth
+from gantrytau_optimica.calibration.judging.fitted_numbers import mean_by_worth
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 
 

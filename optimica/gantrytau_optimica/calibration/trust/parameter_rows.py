@@ -9,6 +9,7 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.calibration.report.report import nominal_values, scalars
+from gantrytau_optimica.calibration.rods.error_models import shared_name
 from gantrytau_optimica.calibration.rods.nominal_rods import modifications_of
 
 GEOMETRY = ("length", "offset", "direction", "plate_offset", "orientation", "start", "r")
@@ -34,16 +35,10 @@ def parameter_rows(found: Calibration | NamedCalibration) -> list[ParameterRow]:
     rows = []
     for name, value in values.items():
         change = value - nominal[name] if name in nominal else None
-        rows.append(ParameterRow(name, value, deviations.get(_common(name, deviations)), change))
+        rows.append(ParameterRow(name, value, deviations.get(shared_name(name, deviations)), change))
     # rotations of a turntable, by which its orientation is free
     free = [name for name in deviations if name not in values and not name.startswith("direction")]
     return [*rows, *(ParameterRow(name, None, deviations[name], None) for name in free)]
-
-
-def _common(name: str, deviations: Mapping[str, float]) -> str:
-    """The name under which a deviation stands: "direction" may be common to all arms."""
-    shared = name not in deviations and "direction" in name
-    return name[name.index("direction") :] if shared else name
 
 
 def calibrated_geometry(found: Calibration | NamedCalibration) -> dict[str, Any] | None:
