@@ -24,7 +24,7 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
-from gantrytau_optimica.refinement.motions import as_motion
+from gantrytau_optimica.refinement.motions import as_motion, stopped_told
 from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
@@ -126,7 +126,8 @@ class Prepared(Record):
         optimum = self._best(built, program, first, self.near if guess is None else solution_given(guess))
         if self.refine is None:
             return optimum
-        return best_refined(optimum, lambda branch: self._refined(branch, self.refine or 0.0), reached)
+        best = best_refined(optimum, lambda branch: self._refined(branch, self.refine or 0.0), reached)
+        return stopped_told(best)
 
     def _refined(self, optimum: Optimum, accuracy: float) -> Optimum:
         """The optimum on better and better meshes until it holds."""

@@ -44,6 +44,14 @@ class Replayed(Record):
     local: np.ndarray
     complete: bool
 
+    @property
+    def away(self) -> float:
+        """Its largest deviation from the solution at ends of pieces, by sizes of states, as far as it came."""
+        ends = self.x[:, -1][np.all(np.isfinite(self.x[:, -1]), axis=1)]
+        wanted = self.trajectory.signals(self.pieces[: len(ends), 1])[: ends.shape[1]].T
+        sizes = [s.nominal for s in self.trajectory.phase.states]
+        return float(np.max(np.abs(ends - wanted) / sizes, initial=0.0))
+
     @cached_property
     def times(self) -> np.ndarray:
         """All times in s, (17 n,); borders occur twice, once for each side."""
@@ -269,7 +277,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     equations = [ca.densify(one) for one in (algebraics, rates, residuals, slopes)]
     ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000}
+    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 1000}
     options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
     if not kept:
         del dae["z"], dae["alg"]
