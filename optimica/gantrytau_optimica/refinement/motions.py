@@ -58,7 +58,9 @@ def _missed(found: Optimum) -> str:
     scheme = found.program.places.layouts[0].scheme.scheme
     if not found.success or scheme == "shooting" or not any(map(_doubtful, found.phases.values())):
         return ""
-    if not found.playback.complete:  # loops may be singular at a place that the solution passes between its points
+    if (
+        not found.playback.complete
+    ):  # loops may be singular at a place that the solution passes between its points
         away = not found.built.system.loops or any(p.away > 1.0 for p in found.playback.phases.values())
         return found.playback.lines()[0] if away else ""
     worst = max(found.playback.defects, key=lambda d: d.relative, default=None)
@@ -92,7 +94,9 @@ def _doubtful(trajectory: Trajectory) -> bool:
     slopes = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
     x = signals[:n].reshape(n, mesh.elements, PLACES.size).transpose(1, 2, 0)
     rests = x[:, :1] + INTEGRALS @ rows[..., 0] * spans - x
-    grown = np.einsum("epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1])
+    grown = np.einsum(
+        "epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
+    )
     misses = rests[:, -1] + np.einsum("eij,ej->ei", slopes, grown)
     sizes = np.array([s.nominal for s in phase.states])
     if np.all(np.abs(misses) <= RESOLVED * sizes):

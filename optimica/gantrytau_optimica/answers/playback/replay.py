@@ -10,13 +10,12 @@ add up over pieces, and an unstable plant makes them grow: so what 17 places res
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.control.built import Built, with_values
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -243,23 +242,9 @@ class _System:
 def _system(built: Built, trajectory: Trajectory) -> _System:
     phase, problem = trajectory.phase, trajectory.problem
     symbols = [s.symbol for s in phase.algebraics]
-    forms = [built.closed.get(a.name) for a in phase.algebraics]
-    given = with_values([f for f in forms if f is not None], built.read, built.numbers)
-    forms = iter(given)
-    closed = [(i, next(forms)) for i, a in enumerate(phase.algebraics) if a.name in built.closed]
     kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]
-    everything = [
-        phase.ode,
-        phase.residuals[kept] if kept else ca.SX(0, 1),
-        ca.vertcat(ca.SX(0, 1), *symbols),
-    ]
-    if closed:
-        outputs = ca.vertcat(*everything)
-        _, (outputs,) = ca.substitute_inplace(
-            [symbols[i] for i, _ in closed], [ca.densify(form) for _, form in closed], [outputs], False
-        )
-        sizes = np.cumsum([0, *(e.numel() for e in everything)])
-        everything = [outputs[int(a) : int(b)] for a, b in pairwise(sizes)]
+    everything = [phase.ode, phase.residuals[kept], ca.vertcat(ca.SX(0, 1), *symbols)]
+    everything = built.in_closed_form(phase, [ca.densify(one) for one in everything])
     place, begin, span = ca.SX.sym("place"), ca.SX.sym("begin"), ca.SX.sym("span")
     nodes = _nodes(trajectory)
     inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]
