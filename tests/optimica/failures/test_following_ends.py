@@ -63,7 +63,7 @@ AXES = [(1, 2, 3), (-2, 1, 1), (1, 1, 0), (0, 0, 1), (1, 0, 0)]
 
 
 @pytest.mark.parametrize(
-    ("axis", "degrees"), first_of([(axis, angle) for angle in (150, 120, 90, 180) for axis in AXES], 1)
+    ("axis", "degrees"), first_of([(axis, angle) for angle in (150, 120, 90) for axis in AXES], 1)
 )
 def test_a_turn_takes_as_long_as_the_one_back(axis, degrees):
     """Played backwards, the motion that turns a body about an axis turns it about the opposite one."""
