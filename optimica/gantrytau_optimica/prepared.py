@@ -16,7 +16,7 @@ from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.first_guesses.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
-from gantrytau_optimica.failures.following_ends import following_ends, without_following
+from gantrytau_optimica.failures.following_ends import contradicted, following_ends, without_following
 from gantrytau_optimica.failures.held_ends import held_ends
 from gantrytau_optimica.failures.open_ends import open_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
@@ -24,14 +24,14 @@ from gantrytau_optimica.failures.relaxation import worth_relaxing
 from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
-from gantrytau_optimica.refinement.motions import as_motion
+from gantrytau_optimica.refinement.motions import as_motion, stopped_told
 from gantrytau_optimica.refinement.multistart import best_refined, searched
 from gantrytau_optimica.refinement.off_margins import off_margins
 from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, solved_by_arcs, without_ramps
 from gantrytau_optimica.solving.clock import Clock
-from gantrytau_optimica.solving.ipopt import NOT_BEGUN, WORDS, Solver, SolverSettings, objective_size
-from gantrytau_optimica.solving.second_look import beside_obstacles, places_aside
+from gantrytau_optimica.solving.ipopt import NOT_BEGUN, Solver, SolverSettings, objective_size
+from gantrytau_optimica.solving.second_look import aside, beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe
@@ -50,16 +50,9 @@ MOST_AGAIN = 400  # iterations of a solve that starts from a solution on another
 FAR = 1e2  # times larger or smaller than its guess is a free number whose size the guess did not tell
 VANISHED = 1e-7  # of its size: what a solve leaves of a number that is zero
 MOST_CLOSER = 100  # iterations closer to zeros of square roots, where many more lead nowhere
-MET = 1e-4  # of its size: by how much a mesh may miss a condition that follows from others
+BENT = (0.1, -0.1)  # of their sizes: how far signals of a guess are bent aside where ends follow from others
 MOST_LEFT = 3  # places that are no minimum, which a solve leaves
 
-STALLED = tuple(
-    WORDS[word]
-    for word in (
-        "Maximum_Iterations_Exceeded", "Search_Direction_Becomes_Too_Small", "Restoration_Failed",
-        "Error_In_Step_Computation", "Infeasible_Problem_Detected", "Solved_To_Acceptable_Level",
-    )
-)  # fmt: skip
 NO_MINIMUM = "stationary but no minimum, as the objective falls to a side; try another guess= or starts="
 REMEDIES = {
     "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
@@ -126,7 +119,8 @@ class Prepared(Record):
         optimum = self._best(built, program, first, self.near if guess is None else solution_given(guess))
         if self.refine is None:
             return optimum
-        return best_refined(optimum, lambda branch: self._refined(branch, self.refine or 0.0), reached)
+        best = best_refined(optimum, lambda branch: self._refined(branch, self.refine or 0.0), reached)
+        return stopped_told(best)
 
     def _refined(self, optimum: Optimum, accuracy: float) -> Optimum:
         """The optimum on better and better meshes until it holds."""
@@ -253,6 +247,9 @@ class Prepared(Record):
         than step by step, at last with the objective as it is; each one only where those before leave to be desired.
         Inputs as ramps, where loops keep them from coming quickly or the first of these ways fails, over the answer without.
         """
+        lighter = self._without_following(built, program)
+        if lighter is not None and lighter.success:
+            return lighter
         settings = self.solver.settings
         over_free = settings.firm and self.refine is not None
         if over_free and built.system.loops:
@@ -275,28 +272,29 @@ class Prepared(Record):
                 if over is not None:
                     return over
         assert best is not None
-        if best.solution.status in STALLED:
-            lighter = self._without_following(built, program)
-            worse = lighter and best.success and not lighter.success
-            return best if lighter is None or worse else lighter
-        return best
+        return best if lighter is None or best.success else lighter
 
     def _without_following(self, built: Built, program: Program) -> Optimum | None:
-        """Without conditions at the end that follow from others there, on which a solve gets stuck; None where none do."""
+        """Without conditions at the end that follow from others there, on which a solve gets stuck, from both sides of the
+        guess, which may be a place of symmetry; None where none do, or the motion that is found ends elsewhere.
+        """
         layouts, ends = program.places.layouts, following_ends(built)
         if not ends or layouts[0].scheme.scheme == "shooting":
             return None
         problem = without_following(built, ends)
         lighter = transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme)
-        found = self._in_turn(replace(built, problem=problem), lighter, first_guess(lighter))
-        for limit, state in ends if found.success else []:
-            phase = next(p for p in found.phases.values() if state.symbol.element_hash() in
-                         {s.symbol.element_hash() for s in p.phase.states})  # fmt: skip
-            value = float(phase.values(state.symbol, phase.time[-1:])[0, 0])
-            if abs(value - limit.lower) > MET * state.nominal:
-                status = f"no solution: `{limit.name}` follows from the others at the end, which make it {value:.6g}"
-                return replace(found, solution=replace(found.solution, success=False, status=status))
-        return found
+        built, first = replace(built, problem=problem), first_guess(lighter)
+        most = min(self.solver.settings.max_iterations, MOST_FIRM)
+        solver = self._solver(lighter, replace(self.solver.settings, max_iterations=most))
+        found = [self.solved(built, lighter, solver, aside(lighter, first, far)) for far in BENT]
+        there = [one for one in found if one.success and not contradicted(one.phases.values(), ends)]
+        if there:
+            return min(there, key=lambda one: one.objective)
+        told = next((one for one in found if one.success), None)
+        if told is None:
+            return None
+        status = f"no solution: {contradicted(told.phases.values(), ends)}"
+        return replace(told, solution=replace(told.solution, success=False, status=status))
 
     def _resized(self, found: Optimum) -> Optimum:
         """The optimum once more with sizes as it has them, where a free number ended far from the size of its guess."""

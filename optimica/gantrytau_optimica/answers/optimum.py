@@ -62,6 +62,10 @@ class Optimum(ProgramAnswer):
         lines = [found, str(self.second_order), str(self.playback)] if self.success else [found]
         if self.success and self.refinement is not None and self.arcs:
             lines.append("\n".join(["Arcs:", *(f"  {arc}" for arc in self.arcs)]))
+        if self.success and self.search is None and (moving := self.program.problem.moving_times):
+            lines.append(
+                f"Best near the guess of {' and '.join(moving)}; other times may be better, try starts=."
+            )
         more = [str(x) for x in (self.refinement, self.search) if x is not None]
         return "\n".join([*lines, *more])
 

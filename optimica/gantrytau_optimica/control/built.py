@@ -9,7 +9,7 @@ from gantrytau import ModelError
 from gantrytau.compiler.system import Causality, System
 from gantrytau.language.instructions import computed
 from gantrytau.language.symbols import split_derivative, time
-from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.control.control_problem import ControlProblem, Phase
 from gantrytau_optimica.problem.optimization import Point
 from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
 
@@ -57,6 +57,16 @@ class Built:
                     "it there, in a constraint or an equation"
                 )
         return column
+
+    def in_closed_form(self, phase: Phase, expressions: list[ca.SX]) -> list[ca.SX]:
+        """Expressions with closed forms for the algebraics of a phase that have them."""
+        closed = [(a.symbol, self.closed[a.name]) for a in phase.algebraics if a.name in self.closed]
+        forms = with_values([ca.densify(form) for _, form in closed], self.read, self.numbers)
+        return (
+            ca.substitute_inplace([s for s, _ in closed], forms, expressions, False)[1]
+            if closed
+            else expressions
+        )
 
 
 def with_values(expressions: list[ca.SX], read: SymbolicProblem, numbers: Mapping[str, float]) -> list[ca.SX]:

@@ -191,6 +191,14 @@ class ControlProblem:
         return tuple(p for phase in self.phases for p in phase.points)
 
     @property
+    def moving_times(self) -> list[str]:
+        """Free numbers that choose the times of points, but not those of a horizon."""
+        times = ca.vertcat(ca.SX(0, 1), *(p.time for p in self.points if not isinstance(p.time, str)))
+        ends = ca.vertcat(*(end for phase in self.phases for end in (phase.start_time, phase.final_time)))
+        free = [n for n in self.free if not n.held and not ca.depends_on(ends, n.symbol)]
+        return [n.name for n in free if ca.depends_on(times, n.symbol)]
+
+    @property
     def sums(self) -> tuple[SampleSum, ...]:
         """Sums over samples of all phases."""
         return tuple(s for phase in self.phases for s in phase.sums)

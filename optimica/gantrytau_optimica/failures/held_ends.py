@@ -45,7 +45,7 @@ def held_ends(built: Built) -> list[str]:
         names = ", ".join(f"{s.name} = {value:.6g}" for s, value in zip(phase.states, x, strict=True))
         needed = _inputs(inverse, x)
         if np.all(np.isfinite(needed)):
-            rests = all(value == 0.0 for value, own in zip(x, _speeds(phase), strict=True) if own)
+            rests = all(value == 0.0 for value, own in zip(x, speeds(phase), strict=True) if own)
             found += _too_weak(built, phase, WORDS[when], needed) if rests else []
             continue
         start = np.array([dae.start.get(s.symbol.name(), 0.0) for s in phase.states])
@@ -68,20 +68,20 @@ def held_ends(built: Built) -> list[str]:
 def _inverse(built: Built, phase: Phase) -> ca.Function | None:
     """Inputs that hold states x at rest, of the model's parameters; None where states do not decide them."""
     names = [s.name for s in phase.states]
-    speeds = [n for n, own in zip(names, _speeds(phase), strict=True) if own]
+    rates = [n for n, own in zip(names, speeds(phase), strict=True) if own]
     inputs = [u.name for u in phase.inputs]
-    if not names or len(speeds) != len(inputs) or 2 * len(speeds) != len(names):
+    if not names or len(rates) != len(inputs) or 2 * len(rates) != len(names):
         return None
     try:
-        function = built.read.dae.function([*names, *(f"der({n})" for n in speeds)], inputs)
+        function = built.read.dae.function([*names, *(f"der({n})" for n in rates)], inputs)
     except (ModelError, StructureError):
         return None
     x = ca.MX.sym("x", len(names))
-    found = function.call([*ca.vertsplit(x), *(ca.MX(0.0) for _ in speeds)])
+    found = function.call([*ca.vertsplit(x), *(ca.MX(0.0) for _ in rates)])
     return ca.Function("inverse", [x], [ca.vertcat(*found)])
 
 
-def _speeds(phase: Phase) -> list[bool]:
+def speeds(phase: Phase) -> list[bool]:
     """Of every state whether it is a speed: its derivative is no other state."""
     states = {s.symbol.element_hash() for s in phase.states}
     return [not (e.is_symbolic() and e.element_hash() in states) for e in phase.ode.elements()]

@@ -1,8 +1,8 @@
 """Answers that are no motion of the model: stationary points of equations on a mesh too coarse for them, solved again.
 
-    d(k + 1) = exp(A h) d(k) + int exp(A (h - t)) (f - dx/dt) dt,  A = df/dx        over element k, along its polynomials
+    d(k + 1) = exp(A h) d(k) + r + A int exp(A (h - t)) r(t) dt,  A = df/dx,  r(t) = x(0) + int f dt - x(t)
 
-Where this grows large, inputs are played back: they have to lead to the ends that the solution has.
+over element k, along its polynomials. Where d grows large, inputs are played back: they have to lead to the solution's ends.
 """
 
 from collections.abc import Callable
@@ -13,22 +13,16 @@ import numpy as np
 from scipy.linalg import expm
 
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
-from gantrytau_optimica.transcription.mesh import Mesh
+from gantrytau_optimica.answers.playback.replay import INTEGRALS, PLACES
+from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
+from gantrytau_optimica.refinement.remesh import divided
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory
 from gantrytau_optimica.transcription.transcribe import transcribe
 
 DOUBLED = 3  # times that elements are halved
-DOUBTFUL = (
-    0.1  # of its size: by how much a state may end elsewhere, to first order, before inputs are played back
-)
+DOUBTFUL = 0.1  # of its size: first-order estimate of a state's deviation from which inputs are played back
 RESOLVED = 1e-6  # of its size: misses of a state in an element, below which a plant that runs away is no fault of the mesh
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)  # more than points of an element
-PLACES, WEIGHTS = 0.5 + 0.5 * NODES, 0.5 * WEIGHTS
-# rates by the place from values of a polynomial at the places
-RATES = 2 * np.polynomial.legendre.legval(NODES, np.polynomial.legendre.legder(np.eye(10))).T
-RATES = RATES @ np.linalg.inv(np.polynomial.legendre.legvander(NODES, 9))
 
 
 def as_motion(
@@ -46,19 +40,29 @@ def as_motion(
             break
         found, missed, doubled = again, _missed(again), doubled + 1
     if not missed:
-        return found
+        return stopped_told(found)
     status = f"no motion: played back, {missed}"
     return replace(found, solution=replace(found.solution, success=False, status=status))
 
 
+def stopped_told(found: Optimum) -> Optimum:
+    """The answer, called a solution on its mesh only where its playback, if it was played, stopped on the way."""
+    if not found.success or "playback" not in vars(found) or found.playback.complete:
+        return found
+    status = f"{found.status} on this mesh only: played back, {found.playback.lines()[0]}"
+    return found.with_notes(solution=replace(found.solution, status=status))
+
+
 def _missed(found: Optimum) -> str:
     """What inputs miss by more than its size, in words; "" of a motion, or of an answer that is none."""
-    trajectories = list(found.phases.values())
     scheme = found.program.places.layouts[0].scheme.scheme
-    if not found.success or scheme == "shooting" or not any(_doubtful(one) for one in trajectories):
+    if not found.success or scheme == "shooting" or not any(map(_doubtful, found.phases.values())):
         return ""
-    if not found.playback.complete:  # which the report tells: an integrator that stops proves no other motion
-        return ""
+    if (
+        not found.playback.complete
+    ):  # loops may be singular at a place that the solution passes between its points
+        away = not found.built.system.loops or any(p.away > 1.0 for p in found.playback.phases.values())
+        return found.playback.lines()[0] if away else ""
     worst = max(found.playback.defects, key=lambda d: d.relative, default=None)
     if worst is None or worst.relative <= 1.0:
         return ""
@@ -71,30 +75,29 @@ def _doubtful(trajectory: Trajectory) -> bool:
     n, m = len(phase.states), len(phase.algebraics)
     if not n:
         return False
-    element = np.repeat(np.arange(mesh.elements), PLACES.size)
-    place = np.tile(PLACES, mesh.elements)
+    element, place = np.repeat(np.arange(mesh.elements), PLACES.size), np.tile(PLACES, mesh.elements)
     times = trajectory.times(mesh.borders[element] + place * mesh.widths[element])
     signals = trajectory.at(element, place, times)
     unknowns = ca.vertcat(*(s.symbol for s in (*phase.states, *phase.algebraics)))
     equations = ca.densify(ca.vertcat(phase.ode, phase.residuals))
     look = trajectory.function(ca.horzcat(equations, ca.jacobian(equations, unknowns)))
-    found = np.array(look(times[None, :], signals)).reshape(n + m, times.size, -1).swapaxes(0, 1)
-    if not np.all(np.isfinite(found)):
+    rows = np.array(look(times[None, :], signals)).reshape(n + m, times.size, -1).swapaxes(0, 1)
+    if not np.all(np.isfinite(rows)):
         return True
-    rows = found[:, :n]  # rates, and their slopes by states and algebraics
-    if m:  # the algebraics follow: dz = -g_z^-1 (g + g_x dx)
-        try:
-            rows = rows[..., : n + 1] - rows[..., n + 1 :] @ np.linalg.solve(
-                found[:, n:, n + 1 :], found[:, n:, : n + 1]
-            )
-        except np.linalg.LinAlgError:
-            return True
+    try:  # the algebraics follow: dz = -g_z^-1 (g + g_x dx)
+        followed = np.linalg.solve(rows[:, n:, n + 1 :], rows[:, n:, : n + 1])
+    except np.linalg.LinAlgError:
+        return True
+    rows = rows[:, :n, : n + 1] - rows[:, :n, n + 1 :] @ followed  # rates, and their slopes by states
     rows = rows.reshape(mesh.elements, PLACES.size, n, n + 1)
-    spans = np.diff(trajectory.times(mesh.borders))
-    slopes = np.einsum("epij,p->eij", rows[..., 1:], WEIGHTS) * spans[:, None, None]
-    x = signals[:n].reshape(n, mesh.elements, PLACES.size)
-    rests = rows[..., 0] * spans[:, None, None] - (x @ RATES.T).transpose(1, 2, 0)
-    misses = np.einsum("epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, WEIGHTS)
+    spans = np.diff(trajectory.times(mesh.borders))[:, None, None]
+    slopes = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
+    x = signals[:n].reshape(n, mesh.elements, PLACES.size).transpose(1, 2, 0)
+    rests = x[:, :1] + INTEGRALS @ rows[..., 0] * spans - x
+    grown = np.einsum(
+        "epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
+    )
+    misses = rests[:, -1] + np.einsum("eij,ej->ei", slopes, grown)
     sizes = np.array([s.nominal for s in phase.states])
     if np.all(np.abs(misses) <= RESOLVED * sizes):
         return False
@@ -105,25 +108,12 @@ def _doubtful(trajectory: Trajectory) -> bool:
 
 
 def _doubled(found: Optimum) -> Program:
-    """The program on elements of half the length, inputs in pieces of the same lengths."""
+    """The program on elements of half the length, inputs in the pieces that they have."""
     layouts = found.program.places.layouts
-    meshes = [_halved(layout.mesh) for layout in layouts]
-    problem = _with_pieces(found.program.problem)
-    return transcribe(problem, meshes, layouts[0].scheme)
-
-
-def _halved(mesh: Mesh) -> Mesh:
-    middles = (mesh.borders[:-1] + mesh.borders[1:]) / 2
-    borders = np.insert(mesh.borders, np.arange(1, mesh.borders.size), middles)
-    return replace(mesh, borders=borders, moving=tuple(2 * k for k in mesh.moving))
-
-
-def _with_pieces(problem: ControlProblem) -> ControlProblem:
-    def pieces(own: Pieces) -> Pieces:
-        grouped = own.kind in ("constant", "linear") and not own.borders
-        return replace(own, elements=2 * own.elements) if grouped else own
-
-    def changed(phase: Phase, signal: Signal) -> Signal:
-        return replace(signal, pieces=pieces(signal.pieces)) if signal in phase.inputs else signal
-
-    return problem.with_signals(changed)
+    meshes = [layout.mesh for layout in layouts]
+    halved = [
+        replace(m, borders=divided(m.borders, np.full(m.elements, 2)), moving=tuple(2 * k for k in m.moving))
+        for m in meshes
+    ]
+    problem = with_pieces(found.program.problem, meshes, lambda _, own, mesh: kept_pieces(own, mesh))
+    return transcribe(problem, halved, layouts[0].scheme)

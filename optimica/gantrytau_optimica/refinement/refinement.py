@@ -85,27 +85,39 @@ class Refinement:
         )
 
 
+def with_pieces(
+    problem: ControlProblem, meshes: Sequence[Mesh], pieces: Callable[[Phase, Pieces, Mesh], Pieces]
+) -> ControlProblem:
+    """The problem with its inputs in other pieces, by their phase, their own pieces, and the mesh of the phase."""
+
+    def changed(phase: Phase, mesh: Mesh) -> Phase:
+        inputs = tuple(replace(s, pieces=pieces(phase, s.pieces, mesh)) for s in phase.inputs)
+        return replace(phase, inputs=inputs)
+
+    phases = (changed(phase, mesh) for phase, mesh in zip(problem.phases, meshes, strict=True))
+    return replace(problem, phases=tuple(phases))
+
+
+def kept_pieces(own: Pieces, mesh: Mesh) -> Pieces:
+    """Pieces that the caller chose on the borders that they have on a mesh, whatever elements come later."""
+    if own.kind in ("free", "ramps") or own.borders:
+        return own
+    return replace(own, borders=tuple(np.unique(np.append(mesh.borders[:: own.elements], 1.0)).tolist()))
+
+
 def with_ramps(problem: ControlProblem, meshes: Sequence[Mesh]) -> ControlProblem:
     """The problem with its free inputs as straight lines in each element: what keeps to limits at both ends keeps to
     them between. Inputs in pieces that the caller chose keep the borders that these have on the first mesh; where an
     equality along the path says what they are, which no straight line could follow, inputs stay free.
     """
+    following = [phase for phase in problem.phases if _follows(phase)]
 
-    def pieces(signal: Signal, mesh: Mesh) -> Pieces:
-        own = signal.pieces
-        if own.kind in ("free", "ramps"):
-            return Pieces("ramps")
-        borders = np.unique(np.append(mesh.borders[:: own.elements], 1.0))
-        return replace(own, borders=tuple(borders.tolist()))
+    def pieces(phase: Phase, own: Pieces, mesh: Mesh) -> Pieces:
+        if phase in following:
+            return own
+        return Pieces("ramps") if own.kind in ("free", "ramps") else kept_pieces(own, mesh)
 
-    def changed(phase: Phase, mesh: Mesh) -> Phase:
-        if _follows(phase):
-            return phase
-        inputs = tuple(replace(s, pieces=pieces(s, mesh)) for s in phase.inputs)
-        return replace(phase, inputs=inputs)
-
-    phases = (changed(phase, mesh) for phase, mesh in zip(problem.phases, meshes, strict=True))
-    return replace(problem, phases=tuple(phases))
+    return with_pieces(problem, meshes, pieces)
 
 
 def _follows(phase: Phase) -> bool:
@@ -124,11 +136,11 @@ def _follows(phase: Phase) -> bool:
 def without_ramps(problem: ControlProblem) -> ControlProblem:
     """The problem with inputs that are free at every point instead of ramps."""
 
-    def changed(phase: Phase) -> Phase:
-        inputs = (replace(s, pieces=Pieces()) if s.pieces.kind == "ramps" else s for s in phase.inputs)
-        return replace(phase, inputs=tuple(inputs))
+    def changed(phase: Phase, signal: Signal) -> Signal:
+        ramps = signal in phase.inputs and signal.pieces.kind == "ramps"
+        return replace(signal, pieces=Pieces()) if ramps else signal
 
-    return replace(problem, phases=tuple(changed(phase) for phase in problem.phases))
+    return problem.with_signals(changed)
 
 
 def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], reached: BestSoFar) -> Optimum:

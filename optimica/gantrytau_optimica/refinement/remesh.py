@@ -64,12 +64,12 @@ def zoomed(played: Replayed, accuracy: float, places: np.ndarray) -> Mesh:
     beside = np.unique(np.clip(np.concatenate(sides), 0, widths.size - 1))
     parts = _parts(played, accuracy)
     parts[beside] = np.where(widths[beside] > LEAST, np.maximum(parts[beside], MOST_PARTS), parts[beside])
-    return Mesh(_divided(borders, parts))
+    return Mesh(divided(borders, parts))
 
 
 def _with_knots(borders: np.ndarray, parts: np.ndarray, knots: np.ndarray) -> np.ndarray:
     """Borders with elements divided, and with knots, to which borders close by give way."""
-    kept = _divided(borders, parts)[1:-1]
+    kept = divided(borders, parts)[1:-1]
     for knot in knots:
         element = int(np.clip(np.searchsorted(borders, knot) - 1, 0, borders.size - 2))
         near = max(LEAST, NEAR * min(np.diff(borders)[max(element - 1, 0) : element + 2]))
@@ -155,7 +155,7 @@ def _rough(trajectory: Trajectory) -> np.ndarray:
     return found
 
 
-def _divided(borders: np.ndarray, parts: np.ndarray) -> np.ndarray:
+def divided(borders: np.ndarray, parts: np.ndarray) -> np.ndarray:
     """Borders with every element divided into equal parts."""
     inner = [np.linspace(a, b, k + 1)[:-1] for a, b, k in zip(borders[:-1], borders[1:], parts, strict=True)]
     return np.concatenate([*inner, [1.0]])

@@ -35,6 +35,19 @@ def places_aside(program: Program, solution: Solution) -> Iterator[np.ndarray]:
         yield np.clip(beside, program.lbw, program.ubw) * scale
 
 
+def aside(program: Program, first: np.ndarray, far: float) -> np.ndarray:
+    """A first guess (n,) with its signals bent by parts `far` of their sizes, each with a phase of its own, off symmetry:
+    beside a turn about one axis other axes have a slope.
+    """
+    w, scale = first.copy(), program.places.scale
+    for layout in program.places.layouts:
+        for number in range(len(layout.phase.signals)):
+            mine = layout.of(number)
+            share = np.pi * layout.moment[mine - layout.first]
+            w[mine] += far * scale[mine] * np.sin(share) * np.cos(number + share)
+    return np.clip(w / scale, program.lbw, program.ubw) * scale
+
+
 def beside_obstacles(program: Program, first: np.ndarray) -> np.ndarray:
     """A first guess (n,) that passes limits without a slope to either side, moved to one side of them.
 

@@ -9,6 +9,7 @@ from gantrytau import Input, Model, Real, SolveError, der
 from gantrytau_optimica import Free, Optimization, final, optimize
 from gantrytau_optimica.failures.following_ends import following_ends
 from gantrytau_optimica.optimize import prepare
+from tests.families import first_of
 from tests.optimica.known_answers.literature_problems import Reorientation, SwingUp
 
 
@@ -56,6 +57,31 @@ def test_ends_that_follow_from_others(problem, names):
 
 def test_a_problem_with_an_end_that_follows_is_solved():
     assert optimize(Turn).final_time == pytest.approx(2 * np.sqrt(2.0), abs=1e-6)  # 1 rad in each half
+
+
+AXES = [(1, 2, 3), (-2, 1, 1), (1, 1, 0), (0, 0, 1), (1, 0, 0)]
+
+
+@pytest.mark.parametrize(
+    ("axis", "degrees"), first_of([(axis, angle) for angle in (150, 120, 90) for axis in AXES], 1)
+)
+def test_a_turn_takes_as_long_as_the_one_back(axis, degrees):
+    """Played backwards, the motion that turns a body about an axis turns it about the opposite one."""
+
+    class Turned(Reorientation):
+        way = 1.0
+
+        def constraints(self):
+            half = np.radians(degrees) / 2
+            x, y, z = self.way * np.sin(half) * np.array(axis) / np.linalg.norm(axis)
+            yield final(self.body.q) == [x, y, z, np.cos(half)]
+            yield final(self.body.w) == [0.0, 0.0, 0.0]
+
+    class Back(Turned):
+        way = -1.0
+
+    there, back = optimize(Turned), optimize(Back)
+    assert there.final_time == pytest.approx(back.final_time, rel=1e-4)
 
 
 def test_an_end_that_contradicts_others_is_named():

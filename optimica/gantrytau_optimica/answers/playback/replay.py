@@ -10,13 +10,12 @@ add up over pieces, and an unstable plant makes them grow: so what 17 places res
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.control.built import Built, with_values
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
@@ -43,6 +42,14 @@ class Replayed(Record):
     z: np.ndarray
     local: np.ndarray
     complete: bool
+
+    @property
+    def away(self) -> float:
+        """Its largest deviation from the solution at ends of pieces, by sizes of states, as far as it came."""
+        ends = self.x[:, -1][np.all(np.isfinite(self.x[:, -1]), axis=1)]
+        wanted = self.trajectory.signals(self.pieces[: len(ends), 1])[: ends.shape[1]].T
+        sizes = [s.nominal for s in self.trajectory.phase.states]
+        return float(np.max(np.abs(ends - wanted) / sizes, initial=0.0))
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -235,23 +242,9 @@ class _System:
 def _system(built: Built, trajectory: Trajectory) -> _System:
     phase, problem = trajectory.phase, trajectory.problem
     symbols = [s.symbol for s in phase.algebraics]
-    forms = [built.closed.get(a.name) for a in phase.algebraics]
-    given = with_values([f for f in forms if f is not None], built.read, built.numbers)
-    forms = iter(given)
-    closed = [(i, next(forms)) for i, a in enumerate(phase.algebraics) if a.name in built.closed]
     kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]
-    everything = [
-        phase.ode,
-        phase.residuals[kept] if kept else ca.SX(0, 1),
-        ca.vertcat(ca.SX(0, 1), *symbols),
-    ]
-    if closed:
-        outputs = ca.vertcat(*everything)
-        _, (outputs,) = ca.substitute_inplace(
-            [symbols[i] for i, _ in closed], [ca.densify(form) for _, form in closed], [outputs], False
-        )
-        sizes = np.cumsum([0, *(e.numel() for e in everything)])
-        everything = [outputs[int(a) : int(b)] for a, b in pairwise(sizes)]
+    everything = [phase.ode, phase.residuals[kept], ca.vertcat(ca.SX(0, 1), *symbols)]
+    everything = built.in_closed_form(phase, [ca.densify(one) for one in everything])
     place, begin, span = ca.SX.sym("place"), ca.SX.sym("begin"), ca.SX.sym("span")
     nodes = _nodes(trajectory)
     inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]
@@ -269,7 +262,7 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     equations = [ca.densify(one) for one in (algebraics, rates, residuals, slopes)]
     ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 20000}
+    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 1000}
     options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
     if not kept:
         del dae["z"], dae["alg"]
