@@ -118,7 +118,10 @@ def _parts(played: Replayed, accuracy: float) -> np.ndarray:
     local = np.nan_to_num(np.max(np.abs(played.local) / sizes, axis=1, initial=0.0), nan=1.0)
     error = np.zeros(n)
     np.maximum.at(error, owner, local)
-    wanted = accuracy / np.sqrt(n)
+    ends = trajectory.signals(played.pieces[:, 1])[: sizes.size].T
+    missed = np.nan_to_num(np.max(np.abs(played.x[:, -1] - ends) / sizes, initial=0.0))
+    growth = max(1.0, missed / (np.sum(local) or 1.0))  # of errors, by a plant that is unstable
+    wanted = accuracy / np.sqrt(n) / growth
     passed = np.zeros(n)
     np.maximum.at(passed, owner, _passed(played))
     ratio = np.maximum(error / wanted, passed / accuracy)

@@ -214,7 +214,7 @@ class MountainCar(Optimization):
 class Body(Model):
     """A rigid body with a torque about each principal axis; q: unit quaternion, its scalar last."""
 
-    q, w = Real(4, start=[0.0, 0.0, 0.0, 1.0], fixed=True), Real(3, start=0.0, fixed=True)
+    q, w = Real(4, start=[0.0, 0.0, 0.0, 1.0], fixed=True), Real(3, start=0.0, fixed=True, min=-0.5, max=0.5)
     u = Input(3, min=-50.0, max=50.0)
 
     def equations(self):
@@ -231,7 +231,7 @@ class Body(Model):
 class Reorientation(Optimization):
     """Fleming and others (2010), PSOPT: a turn by 150 degrees in least time; all four ends of q, of which one follows."""
 
-    body, final_time = Body(), Free(30.0, min=1.0, max=100.0)
+    body, final_time = Body(), Free(30.0, min=25.0, max=35.0)
 
     def objective(self):
         return self.final_time
