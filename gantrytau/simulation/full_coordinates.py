@@ -92,8 +92,11 @@ class Coordinates:
     @property
     def curved(self) -> bool:
         """Whether rates depend on states other than linearly."""
+        return self.kept("curved", self._curved)
+
+    def _curved(self) -> bool:
         moving, unknown = ca.vertcat(self.ode, self.algebraic), ca.vertcat(self.x, self.z)
-        return self.kept("curved", lambda: ca.depends_on(ca.jacobian(moving, unknown), unknown))
+        return ca.depends_on(ca.jacobian(moving, unknown), unknown)
 
     @property
     def delay_columns(self) -> slice:
@@ -166,11 +169,22 @@ class Coordinates:
             return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
         return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
 
+    def function(self, name: str, make: Callable[[], Sequence[ca.SX]]) -> ca.Function:
+        """(x, z, time, t0, w) -> dense expressions, made once for a name."""
+        return self.kept(
+            ("function", name),
+            lambda: ca.Function(name, self.arguments, [ca.densify(e) for e in make()], {"cse": True}),
+        )
+
     @property
     def renewed(self) -> ca.Function:
-        """The renewal as a function of x, z, t, t0, w."""
-        found = ca.densify(self.renewal)
-        return self.kept("renewed", lambda: ca.Function("renewed", self.arguments, [found], {"cse": True}))
+        """The renewal as a function."""
+        return self.function("renewed", lambda: [self.renewal])
+
+    @property
+    def rates(self) -> ca.Function:
+        """X' as a function."""
+        return self.function("rates", lambda: [self.ode])
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""
@@ -243,7 +257,7 @@ class Coordinates:
 
     def not_finite(self, point: Point, step: float) -> list[str]:
         """Names of what has no finite value at a point, or where its rates lead within a time, s."""
-        function = ca.Function("rates", self.arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
+        function = self.function("moves", lambda: [self.ode, self.algebraic])
         x, z, t, w = point
         rates = np.array(function(x, z, t, t, w)[0]).ravel()
         for share in (0.0, 1e-6, 1e-3, 1.0):
@@ -366,12 +380,8 @@ class Coordinates:
 
     @property
     def _algebra(self) -> AtPlaces:
-        return self.kept("algebra", self._made_algebra)
-
-    def _made_algebra(self) -> AtPlaces:
-        jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
-        parts = [ca.densify(self.algebraic), jacobian]
-        return AtPlaces(ca.Function("algebra", self.arguments, parts, {"cse": True}))
+        parts = "algebra", lambda: [self.algebraic, ca.jacobian(self.algebraic, self.z)]
+        return self.kept("algebra", lambda: AtPlaces(self.function(*parts)))
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -385,7 +395,7 @@ class Coordinates:
                 return found
         if self.pivots.numel() == 0:
             return []
-        function = ca.Function("pivots", self.arguments, [ca.densify(self.pivots)])
+        function = self.function("pivots", lambda: [self.pivots])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
         return depending(here, before, [e.name for e in self.dae.reduced.equations])
 

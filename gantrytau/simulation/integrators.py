@@ -33,7 +33,7 @@ class Integrators:
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
-        self.most = MOST_STEPS
+        self.most, self.steps = MOST_STEPS, 0  # steps: that `over` took
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -44,7 +44,9 @@ class Integrators:
         """
         count = len(t) - 1
         p = [t[0], t[1] - t[0]] if courses is None else []
-        return self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
+        found = self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
+        self.steps = int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
+        return found
 
     def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
         """The point a step later, in s; RuntimeError or SolveError where there is none."""
@@ -56,11 +58,6 @@ class Integrators:
         when, w = np.array([t + step]), there[None]
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
-
-    @property
-    def steps(self) -> int:
-        """How many steps the last call took."""
-        return int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
 
     def interrupt(self) -> None:
         """Act upon Ctrl-C: an integrator at work fails at once, as it would go on after a single interruption."""

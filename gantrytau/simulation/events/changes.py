@@ -40,8 +40,12 @@ class Changes:
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
         arguments = tuple(coordinates.arguments)
-        own = Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
-        self._impulses = coordinates.kept("impulses", lambda: own if turning(dae, pieces) else None)
+        self._impulses: Impulses | None = coordinates.kept(
+            "impulses",
+            lambda: Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
+            if turning(dae, pieces)
+            else None,
+        )
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -184,11 +188,10 @@ class Changes:
                 waits = self.coordinates.slips.postponed(rose, self.point(k))
                 rose, self._holding = rose & ~waits, now & ~waits
             made = rounds.made(self.point(k), rose)
-            failing = next(
-                (one for one, acts in zip(rounds.whens, made.acts, strict=True) if acts and one.failure), None
-            )
-            if failing is not None:
-                raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), failing)
+            acting = [rounds.whens[i] for i in np.flatnonzero(made.acts)]
+            for one in acting:
+                if one.failure:
+                    raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), one)
             self._refuse_bad(made, k)
             if k == left:
                 trail.repeat(k, written=True)
@@ -197,8 +200,7 @@ class Changes:
                 _, trail.held[left], trail.z[left] = self._unsampled
             trail.show(left, k)
             self._make(made, k, rose)
-        labels = [one.label for one, again in zip(rounds.whens, rose, strict=True) if again]
-        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), labels)
+        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), self._labels(rose))
 
     def _make(self, made: Made, k: int, rose: np.ndarray) -> None:
         """Give a place the values of a round, and what follows from them."""
@@ -213,12 +215,9 @@ class Changes:
                 trail.x[k] = coordinates.followed(trail.x[k], t, trail.inputs(k))
             except SolveError as error:
                 raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
+        acting = [coordinates.rounds.whens[i] for i in np.flatnonzero(made.acts)]
         if coordinates.dae.flat.slips:
-            kicked = [
-                bool(acts and one.reinits)
-                for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
-            ]
-            if any(kicked):
+            if any(one.reinits for one in acting):
                 self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
             self._lock(k, first)
         trail.z[k] = self._settled(k)
@@ -230,11 +229,7 @@ class Changes:
             modes = coordinates.switches.following(after.blurred(errors))
             if not np.array_equal(modes, self.modes(k)):
                 self._agree(k, modes, errors)
-        self.ended = "; ".join(
-            one.message
-            for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
-            if acts and one.message
-        )
+        self.ended = "; ".join(one.message for one in acting if one.message)
 
     def _lock(self, k: int, first: np.ndarray) -> None:
         """Hold what has come to rest, but what breaks away again at once: that turns back; first: what was held before."""
@@ -274,15 +269,10 @@ class Changes:
 
     def _refuse_bad(self, made: Made, k: int) -> None:
         """SolveError for a new value that is not finite."""
-        names = [
-            *self.coordinates.discretes,
-            *(self.coordinates.states[i] for i in self.coordinates.rounds.places),
-        ]
-        for name, value in zip(names, [*made.discretes, *made.states], strict=True):
-            if not np.isfinite(value):
-                raise run_ends.set_badly(
-                    self.coordinates.dae, float(self.trail.t[k]), name, self._labels(made.acts)
-                )
+        c, bad = self.coordinates, np.flatnonzero(~np.isfinite(np.concatenate([made.discretes, made.states])))
+        if bad.size:
+            names = [*c.discretes, *(c.states[i] for i in c.rounds.places)]
+            raise run_ends.set_badly(c.dae, float(self.trail.t[k]), names[bad[0]], self._labels(made.acts))
 
     def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""

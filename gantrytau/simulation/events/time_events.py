@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
-from gantrytau.simulation.events.phases import moved, phases
+from gantrytau.simulation.events.phases import moved, phases_along
 
 DENSE = 20_000  # steps of the run in which a margin that is not linear in time is looked for zeros, at least
 FIRST = 200  # of them at once, then more
@@ -35,7 +35,7 @@ class TimeEvents:
             for margin, rate in zip(margins.elements(), rates.elements(), strict=True)
         ]
         self._of = [np.flatnonzero(ca.which_depends(m, w)) for m in margins.elements()]
-        self._phases = [_phases_of(margin, w) for margin in margins.elements()]
+        self._phases = [phases_along(m, [time, w], time, ca.SX(1)) for m in margins.elements()]
         self._windows: dict[tuple[int, bytes], _Window] = {}
 
     def next(self, t: float, w: np.ndarray) -> float | None:
@@ -116,10 +116,3 @@ def _closer(t: np.ndarray, phases: Callable[[np.ndarray], list[np.ndarray]], mos
             continue
         t = np.interp(np.arange(ahead[count - 1] + 1), np.append(0, ahead[:count]), t[: count + 1])
     return t
-
-
-def _phases_of(margin: ca.SX, w: ca.SX) -> AtPlaces | None:
-    """(time, w) -> phases of a margin and their rates; None without any."""
-    found = phases(margin, time)
-    rates = ca.densify(ca.jacobian(found, time))
-    return AtPlaces(ca.Function("phases", [time, w], [ca.densify(found), rates])) if found.numel() else None
