@@ -25,7 +25,6 @@ from gantrytau.simulation.singular_poses import Conditioning, Point, depending
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
-BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time does not vanish
 STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink are rounding
 ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
@@ -209,30 +208,6 @@ class Coordinates:
         found = replace(self, sizes=sizes, conditioning=self.conditioning.anew())
         found.__dict__["made"] = self.made
         return found
-
-    @property
-    def of_time(self) -> ca.SX:
-        """Functions of time alone: known symbols, and equations that name the time, at the start and beside it."""
-        return self.kept("of time", self._of_time)
-
-    def _of_time(self) -> ca.SX:
-        dae, rows = self.dae, []
-        for key, leaves in dae.indexed.incidence.items():
-            if any(leaf.root == time.name() for leaf in leaves):
-                rows.append(dae.indexed.residuals[key])
-        functions = [ca.SX(e) for e in self.known.values()]
-        for beside in (0.0, BESIDE) if rows else ():
-            row = ca.vertcat(*rows)
-            leaves = [leaf for leaf in ca.symvar(row) if leaf.name() != time.name()]
-            steady = dae.table.values
-            values = [
-                steady[n.name()] if n.name() in steady else dae.start[n.name()] * (1 + beside) + beside
-                for n in leaves
-            ]
-            functions.append(ca.substitute(row, ca.vertcat(*leaves), ca.SX(ca.DM(values))) if leaves else row)
-        found = ca.vertcat(*functions) if functions else ca.SX(0, 1)
-        inputs = ca.vertcat(self.w, self.t0)
-        return ca.substitute(found, inputs, 0 * inputs)
 
     def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Consistent states and algebraics at the start, with the inputs as they are then; delays, and modes."""

@@ -10,7 +10,7 @@ from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.between.across import across, lay, left_at
 from gantrytau.simulation.between.narrow_forces import NarrowForces
-from gantrytau.simulation.between.pulses import pulses
+from gantrytau.simulation.between.pulses import functions_of_time, pulses
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
@@ -52,7 +52,8 @@ class Run:
         self.span = end - begin
         if coordinates.pieces.switched.smooth:  # whose pieces nothing keeps a long step from jumping over
             longest = min(longest or np.inf, self.span / LEAST_STEPS)
-        self.pulses = pulses(coordinates.of_time, begin, end, longest)
+        of_time = coordinates.kept("of time", lambda: functions_of_time(coordinates))
+        self.pulses = pulses(of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
         self.narrow = NarrowForces(coordinates)
         interval = float(np.diff(self.trail.t).max())

@@ -42,9 +42,11 @@ class Changes:
         arguments = tuple(coordinates.arguments)
         self._impulses: Impulses | None = coordinates.kept(
             "impulses",
-            lambda: Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
-            if turning(dae, pieces)
-            else None,
+            lambda: (
+                Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
+                if turning(dae, pieces)
+                else None
+            ),
         )
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last

@@ -26,10 +26,8 @@ def phases(expressions: ca.SX, moving: ca.SX) -> ca.SX:
     return ca.vertcat(ca.SX(0, 1), *found.values())
 
 
-def phases_along(
-    expressions: ca.SX, arguments: list[ca.SX], moving: ca.SX, along: ca.SX
-) -> AtPlaces | None:
-    """Phases and their rates as a function of arguments, where the symbols `moving` change at rates `along`; None without any."""
+def phases_along(expressions: ca.SX, arguments: list[ca.SX], moving: ca.SX, along: ca.SX) -> AtPlaces | None:
+    """Phases and their rates as a function of arguments, by the rates `along` of the symbols `moving`; None without any."""
     found = phases(expressions, moving)
     rates = ca.densify(ca.jtimes(found, moving, along))
     function = ca.Function("phases", arguments, [ca.densify(found), rates], {"cse": True})
