@@ -62,9 +62,7 @@ class Run:
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.crosses, self.crossed = crosses, list[float]()  # times, s
-        self.integrators.most = (
-            WALKED_STEPS if crosses else MOST_STEPS
-        )  # soon given up where a pose stands in the way
+        self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up before a pose
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -114,18 +112,12 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if (
-                        count == 1
-                        and not self._nearer()
-                        and not (self.crosses and self._across(self._approach()))
-                    ):
+                    if count == 1 and not self._nearer() and not self._across():
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
                 size = min(CHUNK if turned else size * GROWTH, most)
-                forward = (
-                    self.done > before
-                )  # else places were only laid closer, and nothing is sampled twice
+                forward = self.done > before  # else places were only laid closer: nothing is sampled twice
                 stopped = forward and bool(trail.stops[self.done])
                 if stopped and trail.twice(self.done):
                     self.done = self.changes.behind_inputs(self.done)
@@ -249,9 +241,8 @@ class Run:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
         trail = self.trail
         h = np.diff(trail.t[here : here + count + 1])
-        if (
-            not (trail.courses or self.history) and np.ptp(h) <= 1e-9 * h[0]
-        ):  # nothing changes, so that nothing starts anew
+        # nothing changes, so that nothing starts anew
+        if not (trail.courses or self.history) and np.ptp(h) <= 1e-9 * h[0]:
             length = (trail.t[here + count] - trail.t[here]) / count
             return np.repeat(np.array([[trail.t[here], length, 0, *trail.held[here]]]).T, count, axis=1)
         inputs = trail.rows(np.arange(here, here + count)).T
@@ -310,14 +301,13 @@ class Run:
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
         return False
 
-    def _across(self, found: Approach) -> bool:
+    def _across(self, found: Approach | None = None) -> bool:
         """Whether a singular pose is crossed, if it may be: `done` is then behind it."""
+        if not self.crosses:
+            return False
+        found = found or self._approach()
         begin = int(np.searchsorted(self.trail.t[: self.done + 1], left_at(found))) - 1
-        way = (
-            across(found, self.changes.point(begin), self.integrators)
-            if self.crosses and begin >= 0
-            else None
-        )
+        way = across(found, self.changes.point(begin), self.integrators) if begin >= 0 else None
         if way is None:
             return False
         self.done = self.seen = lay(self.trail, begin, *way)

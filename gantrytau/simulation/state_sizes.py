@@ -14,9 +14,7 @@ from gantrytau.simulation.trail import Trail
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
 LEAST = 1e-6  # of the largest state that it hangs together with: a smaller one may be rounding
 ROUNDING = 8 * np.finfo(float).eps  # of the largest start among such states: a smaller one is rounding
-STEP = (
-    1 / 500
-)  # of a run, that an integrator is to go on in one step through what rounding makes of the rates
+STEP = 0.002  # of a run: a step of the integrator through the rounding errors of the rates
 LOOKED_AT = 64  # places of a run at most, at which rates are asked for their rounding
 
 

@@ -1,8 +1,7 @@
-"""Whether the rates of a motion between its places are what the motion says: forces that are narrow along its path.
+"""Narrow forces: rates between two places that an integrator in long steps does not see.
 
-An integrator that takes long steps sees the rates at their ends only. Between two places the motion is the cubic by states
-and rates at both; in the middle its rate is held against that of the equations there. What differs by more than a share of
-the motion was stepped over, and is integrated again in short steps.
+The cubic through states and rates at two places has a rate in the middle, which is compared with that of the equations
+there. Where they differ by more than a share of the motion, the interval is integrated again in short steps.
 """
 
 import casadi as ca

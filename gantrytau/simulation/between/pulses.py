@@ -1,4 +1,4 @@
-"""Where functions of time rest and then change: an integrator that sees them at rest would step over what follows."""
+"""Pulses: functions of time that rest and then change, which an integrator would step over."""
 
 from dataclasses import dataclass
 
@@ -45,7 +45,7 @@ class Pulses:
 
 
 def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = None) -> Pulses:
-    """What changes after it was at rest in functions of time between begin and end, as far as 20,000 points show it.
+    """The pulses of functions of time between begin and end, s, as far as 20,000 points show them.
 
     longest: the longest step allowed anywhere, s, within which nothing is taken to happen.
     """

@@ -51,9 +51,7 @@ class Changes:
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
-        self._acted: dict[
-            int, tuple[float, np.ndarray]
-        ] = {}  # when: last time, and rates of all margins behind it
+        self._acted: dict[int, tuple[float, np.ndarray]] = {}  # when: last time, rates of margins behind it
         self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
 
     def modes(self, k: int) -> np.ndarray:
@@ -285,12 +283,10 @@ class Changes:
             last, began = self._acted.get(i, (-np.inf, rates))
             if t == last:  # another round of one instant
                 continue
-            if own:
-                fastest = np.maximum(np.abs(began[own]), np.abs(rates[own]))
-                away = fastest * (t - last) / 4  # of a parabola: the farthest
-                self._hops[i] = self._hops[i] + 1 if np.all(away < HOP * noise[own]) else 0
-            else:
-                self._hops[i] = 0
+            away = (
+                np.maximum(np.abs(began[own]), np.abs(rates[own])) * (t - last) / 4
+            )  # farthest, of a parabola
+            self._hops[i] = self._hops[i] + 1 if own and np.all(away < HOP * noise[own]) else 0
             if self._hops[i] >= HOPS:
                 raise run_ends.accumulating(self.coordinates.dae, t, self.coordinates.rounds.whens[i].label)
             self._acted[i] = t, after.rates[0].copy()
@@ -323,10 +319,9 @@ class Changes:
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors, before), modes):
                     return
+        # margins may follow from large numbers that cancel: then rates decide
         known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
-        if np.any(
-            self._rounded > known
-        ):  # margins may follow from large numbers that cancel: then rates decide
+        if np.any(self._rounded > known):
             self.trail.x[k], self.trail.z[k] = before[:2]
             self._agree(k, tried[1], errors)
             return
@@ -353,10 +348,10 @@ class Changes:
         drifted, z, t, w = (a.copy() for a in self.columns(np.array([k])))
         trail.x[k] = coordinates.project(drifted, t, w)[0]
         if self._impulses:  # margins are known no better than constraints
-            looks = [
+            near, far = (
                 coordinates.switches.look(x, z, t, w, self.sizes).values for x in (drifted, trail.x[places])
-            ]
-            errors = np.maximum(errors, 1.1 * np.abs(looks[1] - looks[0])[0])
+            )
+            errors = np.maximum(errors, 1.1 * np.abs(far - near)[0])
         trail.z[k] = self._settled(k)
         return coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 

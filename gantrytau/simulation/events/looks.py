@@ -1,4 +1,4 @@
-"""How close looks at what switches must lie, so that nothing turns there and back between two of them.
+"""Looks: places at which switches are asked, so close that none turns there and back between two of them.
 
 The argument of a sine, a cosine or a tangent within a margin moves by less than a share of its period from one look to the
 next, and the cubic through the values and rates at two looks foretells the one between them.
