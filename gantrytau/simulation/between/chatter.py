@@ -25,7 +25,7 @@ class Chatter:
     def found(
         self, t: float, changed: np.ndarray, before: Margins, whole: np.ndarray
     ) -> tuple[np.ndarray, Literal["", "chattering", "accumulating"]]:
-        """Switches that turn at an instant, and whether they chatter or accumulate; before, whole: margins, and their turns."""
+        """Switches that turn at an instant, and whether they chatter or accumulate; before: margins; whole: turns."""
         turned = np.flatnonzero(changed if changed.any() else at_zero(before, t, whole))
         for i in turned.tolist():
             hops, times = self._turned.setdefault(i, (0, []))

@@ -6,7 +6,7 @@ from threading import Lock
 import casadi as ca
 import numpy as np
 
-BLOCKS = (1, 128, 1024)  # places in one call of the function
+FEW, MANY = 128, 1024  # places in one call of a function that is made for so many
 
 
 class AtPlaces:
@@ -36,7 +36,7 @@ class AtPlaces:
         least the first has a row for each place.
         """
         places = len(arguments[0])  # type: ignore[arg-type]
-        size = max(block for block in BLOCKS if block <= max(places, 1))
+        size = 1 if places < FEW else FEW if places < MANY else MANY
         with self._lock:
             if size not in self._memories:
                 self._memories[size] = self._memory(size)

@@ -29,7 +29,7 @@ class TimeEvents:
         self.begin, self.end = begin, end
         self._counts = np.array([switches.turns[i].counts for i in chosen], dtype=bool)
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
-        self._function = ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)])
+        self._function = AtPlaces(ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)]))
         self._alone = [
             AtPlaces(ca.Function("margin", [time, w], [ca.densify(margin), ca.densify(rate)]))
             for margin, rate in zip(margins.elements(), rates.elements(), strict=True)
@@ -43,8 +43,7 @@ class TimeEvents:
         if not self._linear.size:
             return None
         least = t + 8 * np.spacing(max(abs(t), abs(self.end)))
-        found = []
-        offsets, slopes = (np.array(f).ravel() for f in self._function(0.0, w))
+        found, offsets, slopes = [], *(f[0] for f in self._function(np.zeros(1), w[None]))
         for i in np.flatnonzero(self._linear & (slopes != 0)):
             level = 0.0
             if self._counts[i]:  # the next whole number
