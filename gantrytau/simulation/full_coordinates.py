@@ -98,6 +98,18 @@ class Coordinates:
         return ca.depends_on(ca.jacobian(moving, unknown), unknown)
 
     @property
+    def idle(self) -> np.ndarray:
+        """Which of what is held, (k,) as in a trail, neither motions nor margins depend on."""
+        return self.kept("idle", self._idle)
+
+    def _idle(self) -> np.ndarray:
+        moving = ca.vertcat(
+            self.ode, self.algebraic, *self.invariants, self.switches.margins, self.rounds.past
+        )
+        own = self.w[2 * len(self.sampled) :]
+        return ~np.array(ca.which_depends(moving, own, 1, False), dtype=bool)
+
+    @property
     def delay_columns(self) -> slice:
         """Where the coefficients of delayed values, six of each, stand in what is held."""
         first = len(self.held) + len(self.discretes)

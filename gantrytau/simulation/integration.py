@@ -250,7 +250,7 @@ class Run:
 
     def _gaps(self, places: np.ndarray) -> Margins | None:
         """How far from its next turn each switch is at successive places."""
-        if not len(self.coordinates.switches):
+        if self.changes.by_time.all_foreseen:
             return None
         return self.coordinates.switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
 

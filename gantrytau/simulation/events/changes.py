@@ -48,6 +48,11 @@ class Changes:
                 else None
             ),
         )
+        free = self._impulses is None and not dae.flat.slips
+        self._idle = coordinates.idle if free else np.zeros_like(coordinates.idle)
+        self._timed = np.array(
+            [all(coordinates.switches.timed[k] for k in own) for own in coordinates.rounds.of]
+        )
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -151,9 +156,13 @@ class Changes:
                 if k > 0:
                     trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
                     k = k + 1
-                self._agree(k, modes)
+                idle = self._idle[trail.held.shape[1] - modes.size :][modes != first].all()
+                if idle:
+                    self.modes(k)[:] = modes
+                else:
+                    self._agree(k, modes)
                 sampled = trail.due[left].any()  # results have the side behind only
-                jumped = self._thrown or switches.jumped(self.point(left), self.point(k))
+                jumped = not idle and (self._thrown or switches.jumped(self.point(left), self.point(k)))
                 if k > left and not sampled and jumped:
                     trail.show(left, k)
             if by_states:
@@ -206,16 +215,21 @@ class Changes:
         """Give a place the values of a round, and what follows from them."""
         coordinates, trail = self.coordinates, self.trail
         t, held = float(trail.t[k]), len(coordinates.held)
-        before = self.margins(np.array([k])) if len(coordinates.switches) else None
-        first = trail.held[k].copy()
-        trail.held[k, held : held + len(coordinates.discretes)] = made.discretes
+        first, acting = trail.held[k].copy(), [coordinates.rounds.whens[i] for i in np.flatnonzero(made.acts)]
+        self.ended = "; ".join(one.message for one in acting if one.message)
+        own = slice(held, held + len(coordinates.discretes))
+        idle = (self._idle[own] | (made.discretes == first[own])).all() and self._timed[made.acts != 0].all()
+        idle = idle and not any(one.reinits for one in acting)
+        before = self.margins(np.array([k])) if len(coordinates.switches) and not idle else None
+        trail.held[k, own] = made.discretes
+        if idle:
+            return
         if coordinates.rounds.places.size:
             trail.x[k, coordinates.rounds.places] = made.states
             try:
                 trail.x[k] = coordinates.followed(trail.x[k], t, trail.inputs(k))
             except SolveError as error:
                 raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
-        acting = [coordinates.rounds.whens[i] for i in np.flatnonzero(made.acts)]
         if coordinates.dae.flat.slips:
             if any(one.reinits for one in acting):
                 self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
@@ -223,13 +237,12 @@ class Changes:
         trail.z[k] = self._settled(k)
         if before is not None:
             after = self.margins(np.array([k]))
-            own = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
-            self._watch_hops((made.acts != 0) & own, t, before, after)
+            models = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
+            self._watch_hops((made.acts != 0) & models, t, before, after)
             errors = location_errors(before, after, t, coordinates.switches.whole(before.values))
             modes = coordinates.switches.following(after.blurred(errors))
             if not np.array_equal(modes, self.modes(k)):
                 self._agree(k, modes, errors)
-        self.ended = "; ".join(one.message for one in acting if one.message)
 
     def _lock(self, k: int, first: np.ndarray) -> None:
         """Hold what has come to rest, but what breaks away again at once: that turns back; first: what was held before."""

@@ -20,13 +20,17 @@ HALVINGS = 60
 
 
 class TimeEvents:
-    """The turns of the switches of a run from `begin` to `end` whose margins depend on time, and on modes, alone."""
+    """Turns of the switches of a run from `begin` to `end` whose margins depend on time, and on modes, alone.
+
+    all_foreseen: whether there are no others.
+    """
 
     def __init__(self, switches: Switches, w: ca.SX, begin: float, end: float):
         chosen = [i for i, timed in enumerate(switches.timed) if timed]
         margins = switches.margins[chosen]
         rates = ca.jacobian(margins, time)
         self.begin, self.end = begin, end
+        self.all_foreseen = len(chosen) == len(switches) and not any(switches.turns[i].counts for i in chosen)
         self._counts = np.array([switches.turns[i].counts for i in chosen], dtype=bool)
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
         self._function = AtPlaces(ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)]))
