@@ -25,8 +25,7 @@ from gantrytau.simulation.singular_poses import Point
 
 NOTHING = 1e-12  # of the terms and their change in the run: less is how well a turn is located, no jump
 ROUNDING = 1e-9  # of its terms: a smaller impulse is none
-PARTS = (4, 8, 16, 32, 64, 128)  # of a jump, until twice as many lead to the same place
-SAME = 1e-11
+SAME = 1e-11  # of a jump: how well it is led along its way
 
 
 class Infinite(Exception):
@@ -215,38 +214,23 @@ class _Jump:
         self.y, self._jumps[:, k - 1], self.found = y, jump, True
 
     def _led(self, b: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where J Y = b leads, in as many parts as it takes (Runge and Kutta), and Y of the whole way."""
-        own, found = places >= 0, list[np.ndarray]()
+        """End of the way J Y = b from share 0 to 1 of the jump, and Y of the whole way."""
+        from scipy.integrate import solve_ivp
 
-        def slope(y: np.ndarray) -> np.ndarray:
-            return np.linalg.solve(self._jacobian(y), b)
+        own, n = places >= 0, self.y.size
 
-        def same(some: np.ndarray, others: np.ndarray) -> bool:
-            return bool(np.all(np.abs(some - others) <= SAME * np.abs(some).max(initial=0.0)))
+        def slope(_: float, y: np.ndarray) -> np.ndarray:
+            jump, rates = np.linalg.solve(self._jacobian(y[:n]), b), np.zeros(n)
+            rates[places[own]] = jump[own]
+            return np.append(rates, jump)
 
-        y, jump = self.y.copy(), slope(self.y)
-        for share in (0.37, 0.63):
-            y[places[own]] += share * jump[own]
-            if not same(jump, slope(y)):
-                break
-        else:
-            return y, jump
-        for parts in PARTS:
-            y, jump = self.y.copy(), np.zeros(b.size)
-            for _ in range(parts):
-                steps: list[np.ndarray] = []
-                for share in (0.0, 0.5, 0.5, 1.0):
-                    there = y.copy()
-                    if steps:
-                        there[places[own]] += share / parts * steps[-1][own]
-                    steps.append(slope(there))
-                step = (steps[0] + 2 * steps[1] + 2 * steps[2] + steps[3]) / (6 * parts)
-                y[places[own]] += step[own]
-                jump += step
-            if found and same(jump, found[-1]):
-                break
-            found.append(jump)
-        return y, jump
+        begin = np.append(self.y, np.zeros(b.size))
+        first = slope(0.0, begin)
+        least = SAME * np.abs(first).max()
+        end = begin + first
+        if any(np.any(np.abs(slope(s, begin + s * first) - first) > least) for s in (0.37, 1.0)):
+            end = solve_ivp(slope, (0.0, 1.0), begin, method="DOP853", rtol=SAME, atol=least).y[:, -1]
+        return end[:n], end[n:]
 
     def _check(self, k: int, jump: np.ndarray, b: np.ndarray) -> None:
         """Infinite for what would have to be more than an impulse, and for impulses in laws that are not linear in them."""
