@@ -16,6 +16,7 @@ from gantrytau.simulation.singular_poses import Approach, Point
 from gantrytau.simulation.trail import Trail
 
 AWAY = 0.02  # distance from the pose, relative to that of the measure, at which the motion is left and taken up again
+FINER = 1e-3  # of the tolerance, between the three places: extrapolation enlarges errors some hundred times
 MISSED = 1e-5  # of a state, or of its size: correction of the polynomial by the constraints
 BENT = 1e-2  # of the largest rate of the three places: error of the rates behind the pose
 
@@ -47,9 +48,10 @@ def _part(found: Approach) -> float:
 def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Across, Point] | None:
     """Polynomial across a pose from a point before it, and the point behind the pose; None if the motion does not go on."""
     c, part, points = integrators.coordinates, _part(found), [begin]
+    fine = Integrators(c, FINER * integrators.tolerance, integrators.longest, integrators.interval)
     try:
         for count in (3, 2, 1):
-            points.append(integrators.step(points[-1], found.zero - count * part - points[-1][2]))
+            points.append(fine.step(points[-1], found.zero - count * part - points[-1][2]))
     except (RuntimeError, SolveError):
         return None
     x, z, _, w = (np.array(p) for p in zip(*points[1:], strict=True))
