@@ -129,9 +129,8 @@ class Coordinates:
         steps: int = 100_000,
         modes: Sequence[float] = (),
         longest: float | None = None,
-        compiled: bool = False,
     ) -> ca.Function:
-        """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
+        """An integrator over `count` intervals in the scaled time 0..count.
 
         size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
         it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
@@ -170,15 +169,13 @@ class Coordinates:
         }
         if longest is not None and np.isfinite(longest):
             options["max_step_size"] = longest
-        if compiled:
-            options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
             if size > 1:
                 options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
-            return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
-        return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
+        method = "idas" if self.algebraics else "cvodes"
+        return ca.integrator("simulate", method, problem, 0.0, list(range(1, count + 1)), options)
 
     def function(self, name: str, make: Callable[[], Sequence[ca.SX]]) -> ca.Function:
         """(x, z, time, t0, w) -> dense expressions, made once for a name."""

@@ -323,7 +323,7 @@ class Run:
         return doubtful(columns[2], look) & (alike | look.near[1:])
 
     def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
-        return self.coordinates.conditioning.look(x, z, t[:, None], t[:, None], w)
+        return self.coordinates.conditioning.look(x, z, t, t, w)
 
     def _weakest(self, point: Point) -> list[str]:
         """What degenerates at a point, though it was sound behind the last event."""
