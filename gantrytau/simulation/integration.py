@@ -294,9 +294,10 @@ class Run:
                 continue
             self.done = self.seen = int(k)
             found = self._approach()
-            if found.singular or (not found.arrived and self._weakest(found.point)):
+            weakest = [] if found.arrived else self._weakest(found.point)
+            if found.singular or weakest:
                 if not self._across(found):
-                    raise self._singular_pose(found)
+                    raise run_ends.singular_pose(self.coordinates.dae, found.zero, weakest)
                 return True
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
         return False
@@ -331,13 +332,11 @@ class Run:
         turned = np.flatnonzero(np.any(sides[1:] != sides[:-1], axis=1))
         return self.coordinates.weakest(point, self.changes.point(int(turned[-1]) + 1 if turned.size else 0))
 
-    def _singular_pose(self, found: Approach) -> SolveError:
-        return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))
-
     def _stopped(self, error: Exception) -> SolveError:
         found = self._approach()
-        if self._weakest(found.point):
-            return self._singular_pose(found)
+        weakest = self._weakest(found.point)
+        if weakest:
+            return run_ends.singular_pose(self.coordinates.dae, found.zero, weakest)
         step = float(self.trail.t[min(self.done + 1, self.trail.last)]) - found.point[2]
         endless = self.coordinates.not_finite(found.point, step)
         return run_ends.stopped(self.coordinates.dae, found.point[2], error, endless)

@@ -183,7 +183,7 @@ def _check(
     limits: object,
     singular: object,
 ) -> None:
-    def number(value: object, *kinds: type) -> bool:
+    def number(value: Any, *kinds: type) -> bool:
         return isinstance(value, (*kinds, float, np.floating)) and bool(np.isfinite(value))
 
     times = number(start, int, np.integer) and number(stop, int, np.integer) and start < stop
