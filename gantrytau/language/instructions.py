@@ -1,6 +1,6 @@
 """The reader of CasADi's instructions: a function of scalars computed with values of any kind."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import casadi as ca
@@ -35,6 +35,11 @@ def computed(
         else:
             work[outside[0]] = operation(operator, [work[i] for i in inside])
     return [[found[i] for i in sorted(found)] for found in results]
+
+
+def applied(operator: int, operands: Sequence[ca.SX]) -> ca.SX:
+    """CasADi's operator on expressions."""
+    return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operator, *operands)
 
 
 def refuse_calls(place: str, *expressions: ca.SX) -> None:

@@ -25,7 +25,6 @@ from gantrytau.simulation.singular_poses import Conditioning, Point, depending
 
 LARGEST_DRIFT = 1e-12  # of a constraint relative to its terms, above which a point is projected
 STEPS = 10
-BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time does not vanish
 STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink are rounding
 ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
@@ -92,8 +91,23 @@ class Coordinates:
     @property
     def curved(self) -> bool:
         """Whether rates depend on states other than linearly."""
+        return self.kept("curved", self._curved)
+
+    def _curved(self) -> bool:
         moving, unknown = ca.vertcat(self.ode, self.algebraic), ca.vertcat(self.x, self.z)
-        return self.kept("curved", lambda: ca.depends_on(ca.jacobian(moving, unknown), unknown))
+        return ca.depends_on(ca.jacobian(moving, unknown), unknown)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """Which of what is held, (k,) as in a trail, neither motions nor margins depend on."""
+        return self.kept("idle", self._idle)
+
+    def _idle(self) -> np.ndarray:
+        moving = ca.vertcat(
+            self.ode, self.algebraic, *self.invariants, self.switches.margins, self.rounds.past
+        )
+        own = self.w[2 * len(self.sampled) :]
+        return ~np.array(ca.which_depends(moving, own, 1, False), dtype=bool)
 
     @property
     def delay_columns(self) -> slice:
@@ -115,9 +129,8 @@ class Coordinates:
         steps: int = 100_000,
         modes: Sequence[float] = (),
         longest: float | None = None,
-        compiled: bool = False,
     ) -> ca.Function:
-        """An integrator over `count` intervals in the scaled time 0..count; compiled: by the C compiler.
+        """An integrator over `count` intervals in the scaled time 0..count.
 
         size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
         it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
@@ -156,21 +169,30 @@ class Coordinates:
         }
         if longest is not None and np.isfinite(longest):
             options["max_step_size"] = longest
-        if compiled:
-            options |= {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O1"]}}
         if self.algebraics:
             problem |= {"z": self.z, "alg": algebraic}
             if size > 1:
                 options["abstolv"] = [tolerance] * x.numel() + [tolerance * size] * self.z.numel()
             options["suppress_algebraic"] = True  # forces need not be as smooth as positions: half the steps
-            return ca.integrator("simulate", "idas", problem, 0.0, list(range(1, count + 1)), options)
-        return ca.integrator("simulate", "cvodes", problem, 0.0, list(range(1, count + 1)), options)
+        method = "idas" if self.algebraics else "cvodes"
+        return ca.integrator("simulate", method, problem, 0.0, list(range(1, count + 1)), options)
+
+    def function(self, name: str, make: Callable[[], Sequence[ca.SX]]) -> ca.Function:
+        """(x, z, time, t0, w) -> dense expressions, made once for a name."""
+        return self.kept(
+            ("function", name),
+            lambda: ca.Function(name, self.arguments, [ca.densify(e) for e in make()], {"cse": True}),
+        )
 
     @property
     def renewed(self) -> ca.Function:
-        """The renewal as a function of x, z, t, t0, w."""
-        found = ca.densify(self.renewal)
-        return self.kept("renewed", lambda: ca.Function("renewed", self.arguments, [found], {"cse": True}))
+        """The renewal as a function."""
+        return self.function("renewed", lambda: [self.renewal])
+
+    @property
+    def rates(self) -> ca.Function:
+        """X' as a function."""
+        return self.function("rates", lambda: [self.ode])
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""
@@ -196,30 +218,6 @@ class Coordinates:
         found.__dict__["made"] = self.made
         return found
 
-    @property
-    def of_time(self) -> ca.SX:
-        """Functions of time alone: known symbols, and equations that name the time, at the start and beside it."""
-        return self.kept("of time", self._of_time)
-
-    def _of_time(self) -> ca.SX:
-        dae, rows = self.dae, []
-        for key, leaves in dae.indexed.incidence.items():
-            if any(leaf.root == time.name() for leaf in leaves):
-                rows.append(dae.indexed.residuals[key])
-        functions = [ca.SX(e) for e in self.known.values()]
-        for beside in (0.0, BESIDE) if rows else ():
-            row = ca.vertcat(*rows)
-            leaves = [leaf for leaf in ca.symvar(row) if leaf.name() != time.name()]
-            steady = dae.table.values
-            values = [
-                steady[n.name()] if n.name() in steady else dae.start[n.name()] * (1 + beside) + beside
-                for n in leaves
-            ]
-            functions.append(ca.substitute(row, ca.vertcat(*leaves), ca.SX(ca.DM(values))) if leaves else row)
-        found = ca.vertcat(*functions) if functions else ca.SX(0, 1)
-        inputs = ca.vertcat(self.w, self.t0)
-        return ca.substitute(found, inputs, 0 * inputs)
-
     def start(self, t: float, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Consistent states and algebraics at the start, with the inputs as they are then; delays, and modes."""
         dae = self.dae
@@ -243,7 +241,7 @@ class Coordinates:
 
     def not_finite(self, point: Point, step: float) -> list[str]:
         """Names of what has no finite value at a point, or where its rates lead within a time, s."""
-        function = ca.Function("rates", self.arguments, [ca.densify(self.ode), ca.densify(self.algebraic)])
+        function = self.function("moves", lambda: [self.ode, self.algebraic])
         x, z, t, w = point
         rates = np.array(function(x, z, t, t, w)[0]).ravel()
         for share in (0.0, 1e-6, 1e-3, 1.0):
@@ -366,12 +364,8 @@ class Coordinates:
 
     @property
     def _algebra(self) -> AtPlaces:
-        return self.kept("algebra", self._made_algebra)
-
-    def _made_algebra(self) -> AtPlaces:
-        jacobian = ca.densify(ca.jacobian(self.algebraic, self.z))
-        parts = [ca.densify(self.algebraic), jacobian]
-        return AtPlaces(ca.Function("algebra", self.arguments, parts, {"cse": True}))
+        parts = "algebra", lambda: [self.algebraic, ca.jacobian(self.algebraic, self.z)]
+        return self.kept("algebra", lambda: AtPlaces(self.function(*parts)))
 
     def weakest(self, point: Point, start: Point) -> list[str]:
         """Names of the equations that nearly depend on each other at a point, if they did not at the start.
@@ -385,7 +379,7 @@ class Coordinates:
                 return found
         if self.pivots.numel() == 0:
             return []
-        function = ca.Function("pivots", self.arguments, [ca.densify(self.pivots)])
+        function = self.function("pivots", lambda: [self.pivots])
         here, before = (np.array(function(x, z, t, t, w)) for x, z, t, w in (point, start))
         return depending(here, before, [e.name for e in self.dae.reduced.equations])
 

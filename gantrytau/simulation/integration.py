@@ -10,7 +10,7 @@ from gantrytau.progress import Progress
 from gantrytau.simulation import run_ends
 from gantrytau.simulation.between.across import across, lay, left_at
 from gantrytau.simulation.between.narrow_forces import NarrowForces
-from gantrytau.simulation.between.pulses import pulses
+from gantrytau.simulation.between.pulses import functions_of_time, pulses
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
@@ -52,7 +52,8 @@ class Run:
         self.span = end - begin
         if coordinates.pieces.switched.smooth:  # whose pieces nothing keeps a long step from jumping over
             longest = min(longest or np.inf, self.span / LEAST_STEPS)
-        self.pulses = pulses(coordinates.of_time, begin, end, longest)
+        of_time = coordinates.kept("of time", lambda: functions_of_time(coordinates))
+        self.pulses = pulses(of_time, begin, end, longest)
         self.trail = Trail(coordinates, signals, grid, self.pulses.spans)
         self.narrow = NarrowForces(coordinates)
         interval = float(np.diff(self.trail.t).max())
@@ -61,9 +62,7 @@ class Run:
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.crosses, self.crossed = crosses, list[float]()  # times, s
-        self.integrators.most = (
-            WALKED_STEPS if crosses else MOST_STEPS
-        )  # soon given up where a pose stands in the way
+        self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up before a pose
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
@@ -113,18 +112,12 @@ class Run:
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
                         continue
-                    if (
-                        count == 1
-                        and not self._nearer()
-                        and not (self.crosses and self._across(self._approach()))
-                    ):
+                    if count == 1 and not self._nearer() and not self._across():
                         raise self._stopped(error) from error
                     size, most = 1, most if len(self.coordinates.switches) else 1
                     continue
                 size = min(CHUNK if turned else size * GROWTH, most)
-                forward = (
-                    self.done > before
-                )  # else places were only laid closer, and nothing is sampled twice
+                forward = self.done > before  # else places were only laid closer: nothing is sampled twice
                 stopped = forward and bool(trail.stops[self.done])
                 if stopped and trail.twice(self.done):
                     self.done = self.changes.behind_inputs(self.done)
@@ -248,9 +241,8 @@ class Run:
         """What the integrator is told of each interval: start, length, number, and the inputs."""
         trail = self.trail
         h = np.diff(trail.t[here : here + count + 1])
-        if (
-            not (trail.courses or self.history) and np.ptp(h) <= 1e-9 * h[0]
-        ):  # nothing changes, so that nothing starts anew
+        # nothing changes, so that nothing starts anew
+        if not (trail.courses or self.history) and np.ptp(h) <= 1e-9 * h[0]:
             length = (trail.t[here + count] - trail.t[here]) / count
             return np.repeat(np.array([[trail.t[here], length, 0, *trail.held[here]]]).T, count, axis=1)
         inputs = trail.rows(np.arange(here, here + count)).T
@@ -258,7 +250,7 @@ class Run:
 
     def _gaps(self, places: np.ndarray) -> Margins | None:
         """How far from its next turn each switch is at successive places."""
-        if not len(self.coordinates.switches):
+        if self.changes.by_time.all_foreseen:
             return None
         return self.coordinates.switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))
 
@@ -302,21 +294,21 @@ class Run:
                 continue
             self.done = self.seen = int(k)
             found = self._approach()
-            if found.singular or (not found.arrived and self._weakest(found.point)):
+            weakest = [] if found.arrived else self._weakest(found.point)
+            if found.singular or weakest:
                 if not self._across(found):
-                    raise self._singular_pose(found)
+                    raise run_ends.singular_pose(self.coordinates.dae, found.zero, weakest)
                 return True
         self.done = last  # passed at a distance, or only the choice of coordinates fails there
         return False
 
-    def _across(self, found: Approach) -> bool:
+    def _across(self, found: Approach | None = None) -> bool:
         """Whether a singular pose is crossed, if it may be: `done` is then behind it."""
+        if not self.crosses:
+            return False
+        found = found or self._approach()
         begin = int(np.searchsorted(self.trail.t[: self.done + 1], left_at(found))) - 1
-        way = (
-            across(found, self.changes.point(begin), self.integrators)
-            if self.crosses and begin >= 0
-            else None
-        )
+        way = across(found, self.changes.point(begin), self.integrators) if begin >= 0 else None
         if way is None:
             return False
         self.done = self.seen = lay(self.trail, begin, *way)
@@ -332,7 +324,7 @@ class Run:
         return doubtful(columns[2], look) & (alike | look.near[1:])
 
     def _look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> Look:
-        return self.coordinates.conditioning.look(x, z, t[:, None], t[:, None], w)
+        return self.coordinates.conditioning.look(x, z, t, t, w)
 
     def _weakest(self, point: Point) -> list[str]:
         """What degenerates at a point, though it was sound behind the last event."""
@@ -340,13 +332,11 @@ class Run:
         turned = np.flatnonzero(np.any(sides[1:] != sides[:-1], axis=1))
         return self.coordinates.weakest(point, self.changes.point(int(turned[-1]) + 1 if turned.size else 0))
 
-    def _singular_pose(self, found: Approach) -> SolveError:
-        return run_ends.singular_pose(self.coordinates.dae, found.zero, self._weakest(found.point))
-
     def _stopped(self, error: Exception) -> SolveError:
         found = self._approach()
-        if self._weakest(found.point):
-            return self._singular_pose(found)
+        weakest = self._weakest(found.point)
+        if weakest:
+            return run_ends.singular_pose(self.coordinates.dae, found.zero, weakest)
         step = float(self.trail.t[min(self.done + 1, self.trail.last)]) - found.point[2]
         endless = self.coordinates.not_finite(found.point, step)
         return run_ends.stopped(self.coordinates.dae, found.point[2], error, endless)

@@ -14,6 +14,8 @@ from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.singular_poses import Point
 
 MOST_STEPS = 100_000  # of the integrator between two ends
+BRIEF = 1e-5  # of an interval: longer steps are left to the integrator
+SHORT = 1e-12  # of a state, or of its size: change of the rates within a step of second order
 FINEST = 5e-16  # tolerance that CVODES takes
 WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
 
@@ -33,7 +35,7 @@ class Integrators:
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
-        self.most = MOST_STEPS
+        self.most, self.steps = MOST_STEPS, 0  # steps: that `over` took
 
     def over(
         self, x: np.ndarray, z: np.ndarray, t: np.ndarray, courses: np.ndarray | None
@@ -44,23 +46,37 @@ class Integrators:
         """
         count = len(t) - 1
         p = [t[0], t[1] - t[0]] if courses is None else []
-        return self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
+        found = self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
+        self.steps = int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
+        return found
 
     def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
         """The point a step later, in s; RuntimeError or SolveError where there is none."""
         x, z, t, inputs = point
-        stepwise = self.coordinates.stepwise
-        p, u = ([], [t, step, 0, *inputs]) if stepwise else ([t, step], [])
-        near, far = self._integrate(1, most, x, z, p, u)
         there = _later(self.coordinates, inputs, step)
         when, w = np.array([t + step]), there[None]
+        found = self._short(point, step, when, w)
+        if found is None:
+            p, u = ([], [t, step, 0, *inputs]) if self.coordinates.stepwise else ([t, step], [])
+            found = self._integrate(1, most, x, z, p, u)
+        near, far = found
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
 
-    @property
-    def steps(self) -> int:
-        """How many steps the last call took."""
-        return int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
+    def _short(
+        self, point: Point, step: float, when: np.ndarray, w: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """States and algebraics behind a step so short that Heun's is exact to rounding; None if it is longer."""
+        x, z, t, inputs = point
+        if step > BRIEF * self.interval:
+            return None
+        rates = self.coordinates.kept("rates at one", lambda: AtPlaces(self.coordinates.rates))
+        first = rates(x[None], z[None], t, t, inputs[None])[0]
+        far = x + step * first
+        forces = self.coordinates.settle(far, z[None], when, w)
+        bend = step / 2 * (rates(far, forces, when, when, w)[0] - first)
+        short = np.all(np.abs(bend) <= SHORT * np.maximum(np.abs(x), self.sizes))
+        return (far + bend, forces) if short and np.all(np.isfinite(forces)) else None
 
     def interrupt(self) -> None:
         """Act upon Ctrl-C: an integrator at work fails at once, as it would go on after a single interruption."""

@@ -34,10 +34,8 @@ def other_constraints(run: Run) -> tuple[np.ndarray, Translated] | None:
     course = _numbers(run, places)
     sound = soundness(dae.flat, dae.table, frozenset(dae.known), dae.redundant, course)
     there = int(np.flatnonzero(sound > SOUND)[-1]) if np.any(sound > SOUND) else 0
-    if places[there] in (
-        0,
-        run.done,
-    ):  # where those that were kept are sound to the end, the choice is not why it stops
+    # where those that were kept are sound to the end, the choice is not why it stops
+    if places[there] in (0, run.done):
         return None
     flat = replace(dae.flat, initial_equations=())
     try:

@@ -28,9 +28,7 @@ LOST = 0.3  # of the least singular value at the start: below, the equations of 
 SOUND = 0.01  # smallest singular value of a scaled matrix that is taken as a measure at least
 LEAST = 1e-6  # the same of the equations of accelerations and forces
 FORESIGHT = 1.5  # intervals over which a fall of the distance is led on: it may become steeper
-SHARE = (
-    0.5  # of the way to where the distance would be zero, or to where nothing was found, taken in one step
-)
+SHARE = 0.5  # of the way to where the distance would be zero, or nothing was found, taken in one step
 PROBE = 1e-4  # of the interval: a first step, which says how fast the distance falls
 LONGEST = 0.25  # step, of the interval
 SHORTEST = 2.0**-14  # step, of the interval, to come near to where the integration stops

@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.translated import Translated
-from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.trail import Trail
@@ -15,9 +14,7 @@ from gantrytau.simulation.trail import Trail
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
 LEAST = 1e-6  # of the largest state that it hangs together with: a smaller one may be rounding
 ROUNDING = 8 * np.finfo(float).eps  # of the largest start among such states: a smaller one is rounding
-STEP = (
-    1 / 500
-)  # of a run, that an integrator is to go on in one step through what rounding makes of the rates
+STEP = 0.002  # of a run: a step of the integrator through the rounding errors of the rates
 LOOKED_AT = 64  # places of a run at most, at which rates are asked for their rounding
 
 
@@ -92,11 +89,10 @@ def _noise(coordinates: Coordinates, trail: Trail, done: int) -> np.ndarray:
     """
     places = np.unique(np.linspace(0, done, LOOKED_AT).astype(int))
     x, z, t, w = trail.x[places], trail.z[places], trail.t[places, None], trail.rows(places)
-    rates = NarrowForces(coordinates).rates
     found = []
     for sign in (-2, -1, 0, 1, 2):
         near = 1 + sign * np.finfo(float).eps
-        found.append(at_places(rates, x * near, z * near, t * near, t, w)[0])
+        found.append(at_places(coordinates.rates, x * near, z * near, t * near, t, w)[0])
     return np.nan_to_num(np.ptp(found, axis=0)).max(axis=0)
 
 

@@ -10,9 +10,7 @@ from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.signals import SampledCourse, Signal
 
 NEAR = 64  # times the rounding of time, within which a jump is that of an output point
-LEAST_STEPS = (
-    500  # between places at which singular poses and switches are looked for, whatever points are asked for
-)
+LEAST_STEPS = 500  # of a run between looks for singular poses and switches, whatever points are asked for
 
 
 class Trail:

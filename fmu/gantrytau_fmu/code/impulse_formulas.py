@@ -14,7 +14,7 @@ from gantrytau_fmu.code.switching import WithModes
 @dataclass(frozen=True, eq=False)
 class ImpulseFormulas:
     """symbols: all variables with their derivatives, of the system; jacobian, by_level: in `y`, which stands for them, and
-    in jumps `j`, a column for each level; states: places in y.
+    in jumps `j`, a column for each level; states: their places in y.
     """
 
     levels: Levels
@@ -23,6 +23,7 @@ class ImpulseFormulas:
     j: ca.SX
     jacobian: ca.SX
     by_level: tuple[ca.SX, ...]
+    states: list[int]
 
     @property
     def arrays(self) -> dict[str, ca.SX]:
@@ -33,12 +34,6 @@ class ImpulseFormulas:
     def everything(self) -> tuple[ca.SX, ...]:
         """All expressions."""
         return self.symbols, self.jacobian, *self.by_level
-
-    @property
-    def states(self) -> list[int]:
-        """Places of the states in y."""
-        places = {name: i for i, name in enumerate(self.levels.names)}
-        return [places[n] for n in self.levels.dae.choice.states]
 
 
 def turning_names(found: WithModes) -> frozenset[str]:
@@ -57,7 +52,8 @@ def impulses_of(
     levels = Levels(dae, found.pieces.residuals, known)
     if not turning_names(found):
         nothing = ca.SX(0, 1)
-        return ImpulseFormulas(levels, nothing, nothing, nothing, nothing, ())
+        return ImpulseFormulas(levels, nothing, nothing, nothing, nothing, (), [])
+    states = [levels.names.index(n) for n in dae.choice.states]
     most = int(levels.counts.max(initial=0))
     y, j = ca.SX.sym("y", len(levels.names)), ca.SX.sym("j", levels.counts.size * most)
     columns = ca.horzsplit(ca.reshape(j, levels.counts.size, most))
@@ -67,4 +63,4 @@ def impulses_of(
     rows = outside.inserted([ca.densify(e) for e in rows])
     jacobian, *by_level = ca.substitute(rows, [levels.symbols[0]], [y])
     symbols = ca.vertcat(*at_once(levels.symbols[0].elements()))
-    return ImpulseFormulas(levels, symbols, y, j, jacobian, tuple(by_level))
+    return ImpulseFormulas(levels, symbols, y, j, jacobian, tuple(by_level), states)

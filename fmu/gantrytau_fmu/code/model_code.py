@@ -205,7 +205,7 @@ def _of_impulses(impulses: ImpulseFormulas) -> list[str]:
     levels = ", ".join(f"gt_level_{k}" for k in range(1, len(impulses.by_level) + 1))
     return [
         f"static void (*const gt_levels[])(const double *const *a, double *restrict r, double *restrict w) = {{{levels}}};",
-        _texts("gt_unknown_names", impulses.levels.dae.indexed.orders),
+        _texts("gt_unknown_names", impulses.levels.unknowns),
         _integers("gt_unknown_orders", impulses.levels.orders),
         _integers("gt_equation_counts", impulses.levels.counts),
         _integers("gt_unknown_ends", impulses.levels.ends),

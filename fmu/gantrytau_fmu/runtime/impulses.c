@@ -167,18 +167,4 @@ static gt_status gt_throw(gt_instance *it) {
 static void gt_take_back(gt_instance *it) {
     memcpy(it->now.x, it->x_before, sizeof it->now.x);
 }
-#else
-static void gt_before(gt_instance *it, const gt_margins *margins) {
-    (void)it;
-    (void)margins;
-}
-
-static gt_status gt_throw(gt_instance *it) {
-    (void)it;
-    return GT_OK;
-}
-
-static void gt_take_back(gt_instance *it) {
-    (void)it;
-}
 #endif

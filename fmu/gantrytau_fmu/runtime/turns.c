@@ -21,9 +21,15 @@
 typedef struct { double values[GT_ROOM(GT_TURNS)], rates[GT_TURNS + 1], noise[GT_ROOM(GT_TURNS)]; } gt_margins;
 
 /* impulses.c: what jumps with modes, from the point before they turn */
+#if GT_LEVELS
 static void gt_before(gt_instance *it, const gt_margins *margins);
 static gt_status gt_throw(gt_instance *it);
 static void gt_take_back(gt_instance *it);
+#else
+#define gt_before(it, margins) ((void)(margins))
+#define gt_throw(it) GT_OK
+#define gt_take_back(it) ((void)(it))
+#endif
 
 /* How far each switch is from its next turn: below zero its mode does not hold. Two of one that counts. pace: of the fastest
  * angle, rad/s. */
@@ -269,13 +275,6 @@ static gt_status gt_next_turn(gt_instance *it, double *next) {
 }
 
 /* ---- Along a step */
-
-static int gt_is_below(const gt_gaps *gaps) {
-    int i;
-    for (i = 0; i < GT_GAPS; i++)
-        if (gaps->left[i] < -gaps->noise[i]) return 1;
-    return 0;
-}
 
 /* The share of a step of that size at which a gap is lowest between its ends, if it may come down to zero there; else 1. */
 static double gt_dip(double size, const gt_gaps *first, const gt_gaps *last) {

@@ -1,9 +1,8 @@
-"""Across a singular pose, with the speeds before it.
+"""Singular poses crossed with the speeds before them.
 
-Where constraints become dependent, ways to move cross, and forces are not determined in the pose itself. A motion that comes
-to it smoothly goes on smoothly: states and rates at three places before it give a polynomial of degree 5 in time, which
-leads to as far behind it. It counts as the motion if constraints and equations of motion hold there, but for what the
-polynomial leaves.
+In a pose where constraints become dependent, ways to move cross, and forces are not determined. A smooth motion is continued
+by the polynomial of degree 5 through states and rates at three places before the pose, to as far behind it, and is accepted
+if the constraints and the equations of motion hold there to the error of the polynomial.
 """
 
 from dataclasses import dataclass
@@ -11,20 +10,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.errors import SolveError
-from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.singular_poses import Approach, Point
 from gantrytau.simulation.trail import Trail
 
 AWAY = 0.02  # distance from the pose, relative to that of the measure, at which the motion is left and taken up again
-MISSED = 1e-5  # of a state, or of its size, by which constraints may move what the polynomial leads to
-BENT = 1e-2  # of the largest rate of the three places, by which a rate behind the pose may be another
+FINER = 1e-3  # of the tolerance, between the three places: extrapolation enlarges errors some hundred times
+MISSED = 1e-5  # of a state, or of its size: correction of the polynomial by the constraints
+BENT = 1e-2  # of the largest rate of the three places: error of the rates behind the pose
 
 
 @dataclass(frozen=True)
 class Across:
-    """The way across: its times (4,), s, three before the pose and one behind it, and the coefficients of its states."""
+    """Polynomial across a pose: times (4,) in s, three before it and one behind, and the coefficients of the states."""
 
     t: np.ndarray
     coefficients: np.ndarray
@@ -35,7 +34,7 @@ class Across:
 
 
 def left_at(found: Approach) -> float:
-    """Time, s, of the first of the three places before a pose that was walked up to; -inf where its time is not known."""
+    """Time of the first of the three places before a pose, s; -inf where the time of the pose is not known."""
     part = _part(found)
     return found.zero - 3 * part if part > 0 else -np.inf
 
@@ -47,16 +46,17 @@ def _part(found: Approach) -> float:
 
 
 def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Across, Point] | None:
-    """The way across a pose that was walked up to from a point before it, and the point behind it; None if there is none."""
+    """Polynomial across a pose from a point before it, and the point behind the pose; None if the motion does not go on."""
     c, part, points = integrators.coordinates, _part(found), [begin]
+    fine = Integrators(c, FINER * integrators.tolerance, integrators.longest, integrators.interval)
     try:
         for count in (3, 2, 1):
-            points.append(integrators.step(points[-1], found.zero - count * part - points[-1][2]))
+            points.append(fine.step(points[-1], found.zero - count * part - points[-1][2]))
     except (RuntimeError, SolveError):
         return None
     x, z, _, w = (np.array(p) for p in zip(*points[1:], strict=True))
     t = found.zero + part * np.array([-3.0, -2.0, -1.0, 1.0])
-    rates = at_places(NarrowForces(c).rates, x, z, t[:3, None], t[:3, None], w)[0]
+    rates = at_places(c.rates, x, z, t[:3, None], t[:3, None], w)[0]
     s = np.arange(3.0)
     powers = np.vander(s, 6, increasing=True)
     slopes = np.hstack([np.zeros((3, 1)), powers[:, :5] * np.arange(1, 6)])
@@ -68,7 +68,7 @@ def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Acr
         return None
     size = np.maximum(np.abs(x).max(axis=0), integrators.sizes)
     forces = c.settle(there, z[2:], when, w[2:])
-    now = at_places(NarrowForces(c).rates, there, forces, when[:, None], when[:, None], w[2:])[0]
+    now = at_places(c.rates, there, forces, when[:, None], when[:, None], w[2:])[0]
     foretold = (np.append(0.0, 4.0 ** np.arange(5) * np.arange(1, 6)) @ way.coefficients) / part
     missed = np.max(np.abs(there - far) / size)
     bent = np.max(np.abs(now - foretold) / np.maximum(np.abs(rates).max(axis=0), integrators.sizes))
@@ -78,12 +78,10 @@ def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Acr
 
 
 def lay(trail: Trail, k: int, way: Across, behind: Point) -> int:
-    """Fill the places of a trail behind place k up to the point behind the pose, of which the place is returned."""
+    """Fill a trail from place k up to the point behind the pose; the place of this point."""
     end = k + int(np.searchsorted(trail.t[k:], behind[2]))
     trail.insert(end - 1, np.array([behind[2]]), stop=True)
-    trail.stops[min(end + 1, trail.last)] = (
-        True  # the interval behind it is another than those before and behind
-    )
+    trail.stops[min(end + 1, trail.last)] = True  # the interval behind it is shorter than others
     places = np.arange(k + 1, end + 1)
     trail.held[places] = trail.held[k]
     trail.x[places] = way.at(trail.t[places])

@@ -1,4 +1,4 @@
-"""Switches that turn again and again and do not leave zero in between, or ever faster: no integrator gets past them."""
+"""Chattering: switches that turn again and again without leaving zero, or ever faster, so that no integrator gets past."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -12,12 +12,8 @@ from gantrytau.simulation.events.margins import Margins
 CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
 MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
 HALVES = 5
-SHRINKING = (
-    0.42  # of an interval between two turns to that after half as many: less than 1 / 2, which is 1 / k
-)
-HOP = (
-    1000  # times rounding: where a margin does not get farther away, rounding decides whether it does at all
-)
+SHRINKING = 0.42  # of an interval between turns to that after half as many turns; 1 / k gives 1 / 2
+HOP = 1000  # times rounding: a margin that stays nearer to zero turns by rounding
 
 
 class Chatter:
@@ -29,7 +25,7 @@ class Chatter:
     def found(
         self, t: float, changed: np.ndarray, before: Margins, whole: np.ndarray
     ) -> tuple[np.ndarray, Literal["", "chattering", "accumulating"]]:
-        """The switches that turn at an instant, and what becomes of them; before: margins at it, whole: where they turn."""
+        """Switches that turn at an instant, and whether they chatter or accumulate; before: margins; whole: turns."""
         turned = np.flatnonzero(changed if changed.any() else at_zero(before, t, whole))
         for i in turned.tolist():
             hops, times = self._turned.setdefault(i, (0, []))

@@ -1,14 +1,12 @@
-"""Whether the rates of a motion between its places are what the motion says: forces that are narrow along its path.
+"""Narrow forces: rates between two places that an integrator in long steps does not see.
 
-An integrator that takes long steps sees the rates at their ends only. Between two places the motion is the cubic by states
-and rates at both; in the middle its rate is held against that of the equations there. What differs by more than a share of
-the motion was stepped over, and is integrated again in short steps.
+The cubic through states and rates at two places has a rate in the middle, which is compared with that of the equations
+there. Where they differ by more than a share of the motion, the interval is integrated again in short steps.
 """
 
 import casadi as ca
 import numpy as np
 
-from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.trail import Trail
@@ -51,15 +49,16 @@ class NarrowForces:
 
     def _lost(self, trail: Trail, places: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """In which intervals between places the rates in the middle are others than those of the motion."""
+        c = self.coordinates
         x, z, t, w = trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
         h = np.diff(t)[:, None]
-        rates = at_places(self.rates, x, z, t[:, None], t[:, None], w)[0]
+        rates = at_places(c.rates, x, z, t[:, None], t[:, None], w)[0]
         middle = (x[1:] + x[:-1]) / 2 - h / 8 * np.diff(rates, axis=0)
         along = 1.5 * np.diff(x, axis=0) / h - (rates[1:] + rates[:-1]) / 4
         begin, at, w = t[:-1], (t[1:] + t[:-1]) / 2, w[:-1]
-        forces = self.coordinates.settle(middle, (z[1:] + z[:-1]) / 2, at, w)
+        forces = c.settle(middle, (z[1:] + z[:-1]) / 2, at, w)
         point = middle, forces, at[:, None], begin[:, None], w
-        defect = h * (at_places(self.rates, *point)[0] - along)
+        defect = h * (at_places(c.rates, *point)[0] - along)
         allowed = LOST * np.maximum(np.maximum(np.abs(x[1:]), np.abs(x[:-1])), sizes)
         lost = ~np.all(np.abs(defect) <= allowed, axis=1)
         for k in np.flatnonzero(lost):  # stiff equations make much of small errors of the states
@@ -70,26 +69,12 @@ class NarrowForces:
 
     def _slopes(self, *point: np.ndarray) -> np.ndarray:
         """Jacobian of the rates at a point, with what the algebraics make of it."""
-        n, m = len(self.coordinates.states), len(self.coordinates.algebraics)
-        parts = at_places(self._jacobian, *point)
+        c = self.coordinates
+        n, m = len(c.states), len(c.algebraics)
+        slopes = [(e, y) for e in (c.ode, c.algebraic) for y in (c.x, c.z)]
+        parts = at_places(c.function("slopes", lambda: [ca.jacobian(*pair) for pair in slopes]), *point)
         shapes = (n, n), (m, n), (n, m), (m, m)  # columns, rows
         by_x, by_z, own, inner = (
             np.nan_to_num(p[0]).reshape(k).T for p, k in zip(parts, shapes, strict=True)
         )
         return by_x - by_z @ np.linalg.lstsq(inner, own, rcond=None)[0] if m else by_x
-
-    @property
-    def rates(self) -> ca.Function:
-        """X' as a function of x, z, time, t0, w."""
-        c = self.coordinates
-        arguments = [c.x, c.z, time, c.t0, c.w]
-        return c.kept("rates", lambda: ca.Function("rates", arguments, [ca.densify(c.ode)], {"cse": True}))
-
-    @property
-    def _jacobian(self) -> ca.Function:
-        c = self.coordinates
-        found = [ca.jacobian(e, y) for e in (c.ode, c.algebraic) for y in (c.x, c.z)]
-        arguments = [c.x, c.z, time, c.t0, c.w]
-        return c.kept(
-            "slopes", lambda: ca.Function("slopes", arguments, [ca.densify(e) for e in found], {"cse": True})
-        )

@@ -1,4 +1,4 @@
-"""Limits of variables, their `min` and `max`, in a run: which are passed, when and how far, or the run ends there."""
+"""Limits of variables, `min` and `max`: which a run passes, when and how far, or the end of the run there."""
 
 from dataclasses import replace
 
@@ -10,9 +10,7 @@ from gantrytau.compiler.translation import translate_flat
 from gantrytau.flattening.flat_model import FlatModel, When
 from gantrytau.results.result import Result
 
-PASSED = (
-    1e-6  # of a limit, or of the largest value where it is 0: less is what an end stop gives, or rounding
-)
+PASSED = 1e-6  # of a limit, or of the largest value where it is 0: less is the give of an end stop
 SHOWN = 4  # names in a warning
 HALVINGS = 40  # of the time between two rows
 
@@ -56,17 +54,10 @@ def passed(dae: Translated, result: Result) -> str:
         beyond = bound - values if side == "min" else values - bound
         rows = np.flatnonzero(beyond > PASSED * max(abs(bound), float(np.max(np.abs(values), initial=0.0))))
         if rows.size:
-            unit = result.unit(name)
-            unit = "" if unit in (None, "1") else f" {unit}"
-            worst = float(values[np.argmax(beyond)])
-            when = _when(result, name, bound, int(rows[0]))
-            told.append(
-                (
-                    when,
-                    f"{name} passes its {side} of {bound:.6g}{unit} at t = {when:.5g} s and "
-                    f"comes to {worst:.6g}{unit}",
-                )
-            )
+            unit = "" if result.unit(name) in (None, "1") else f" {result.unit(name)}"
+            worst, when = float(values[np.argmax(beyond)]), _when(result, name, bound, int(rows[0]))
+            words = f"{name} passes its {side} of {bound:.6g}{unit} at t = {when:.5g} s and comes to {worst:.6g}{unit}"
+            told.append((when, words))
     if not told:
         return ""
     rest = f", and {len(told) - SHOWN} more" if len(told) > SHOWN else ""

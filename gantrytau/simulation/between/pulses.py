@@ -1,4 +1,4 @@
-"""Where functions of time rest and then change: an integrator that sees them at rest would step over what follows."""
+"""Pulses: functions of time that rest and then change, which an integrator would step over."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,29 @@ import numpy as np
 
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import time
+from gantrytau.simulation.full_coordinates import Coordinates
 
 DENSE = 20_000  # steps of the run in which functions of time are looked at
 COARSE = 500  # parts of the run, of each of which is asked whether they rest
+BESIDE = 0.37  # of a value, and beside it: where a factor of a function of time does not vanish
 AT_REST = 1e-6  # of all its changes: what a function may change in a part in which it rests
 RESTING = 4  # parts in a row in which a function rests, so that an integrator forgets it
 MOST = 2_000_000  # steps in which it is looked at for the sake of a shorter longest step
+
+
+def functions_of_time(coordinates: Coordinates) -> ca.SX:
+    """Functions of time alone: known symbols, and equations that name the time, at the start and beside it."""
+    dae, steady = coordinates.dae, coordinates.dae.table.values
+    timed = [k for k, own in dae.indexed.incidence.items() if any(leaf.root == time.name() for leaf in own)]
+    rows = ca.vertcat(ca.SX(0, 1), *(dae.indexed.residuals[key] for key in timed))
+    leaves = [leaf for leaf in ca.symvar(rows) if leaf.name() != time.name()]
+    found = ca.vertcat(ca.SX(0, 1), *coordinates.known.values())
+    for beside in (0.0, BESIDE) if timed else ():
+        starts = {leaf.name(): dae.start.get(leaf.name(), 0.0) * (1 + beside) + beside for leaf in leaves}
+        values = [steady.get(leaf.name(), starts[leaf.name()]) for leaf in leaves]
+        found = ca.vertcat(found, ca.substitute(rows, ca.vertcat(ca.SX(0, 1), *leaves), ca.SX(ca.DM(values))))
+    inputs = ca.vertcat(coordinates.w, coordinates.t0)
+    return ca.substitute(found, inputs, 0 * inputs)
 
 
 @dataclass(frozen=True)
@@ -28,7 +45,7 @@ class Pulses:
 
 
 def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = None) -> Pulses:
-    """What changes after it was at rest in functions of time between begin and end, as far as 20,000 points show it.
+    """The pulses of functions of time between begin and end, s, as far as 20,000 points show them.
 
     longest: the longest step allowed anywhere, s, within which nothing is taken to happen.
     """

@@ -1,7 +1,7 @@
-"""What rounding makes of a number: the sum over all operations that lead to it.
+"""Rounding error of an expression: the sum over all its operations.
 
-Each result is v (1 + e) with |e| <= 2^-53; to first order a number is off by at most 2^-53 times the sum of its derivatives
-by the e of all operations (Wilkinson). That is much where large terms cancel, however small the number is.
+Each operation gives v (1 + e) with |e| <= 2^-53; to first order the error is at most 2^-53 times the sum of the derivatives
+by all e (Wilkinson), large where large terms cancel.
 """
 
 from collections.abc import Sequence
@@ -9,28 +9,21 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from gantrytau.language.instructions import applied, computed
+
 UNIT = np.finfo(float).eps / 2
 
 
 def rounding(arguments: Sequence[ca.SX], expression: ca.SX) -> ca.Function:
-    """Of the same arguments, a bound of the rounding errors of an expression's elements, (n,)."""
+    """Bound of the rounding errors of an expression's elements, (n,), as a function of the same arguments."""
     function = ca.Function("exact", list(arguments), [ca.densify(expression)], {"cse": True})
-    work: dict[int, ca.SX] = {}
-    found, errors = [ca.SX(0)] * function.numel_out(0), []
-    for k in range(function.n_instructions()):
-        operation, into = function.instruction_id(k), function.instruction_output(k)
-        given = function.instruction_input(k)
-        if operation == ca.OP_CONST:
-            work[into[0]] = ca.SX(function.instruction_constant(k))
-        elif operation == ca.OP_INPUT:
-            work[into[0]] = arguments[given[0]][given[1]]
-        elif operation == ca.OP_OUTPUT:
-            found[into[1]] = work[given[0]]
-        else:
-            operands = [work[i] for i in given]
-            make = ca.SX.unary if len(operands) == 1 else ca.SX.binary
-            errors.append(ca.SX.sym("e"))
-            work[into[0]] = make(operation, *operands) * (1 + errors[-1])
+    errors: list[ca.SX] = []
+
+    def operation(operator: int, operands: list[ca.SX]) -> ca.SX:
+        errors.append(ca.SX.sym("e"))
+        return applied(operator, operands) * (1 + errors[-1])
+
+    [found] = computed(function, lambda k, i: arguments[k][i], ca.SX, operation)
     e = ca.vertcat(ca.SX(0, 1), *errors)
     slopes = ca.substitute(ca.jacobian(ca.vertcat(*found), e), e, ca.SX.zeros(e.numel()))
     bound = UNIT * ca.sum2(ca.fabs(slopes)) if errors else ca.SX.zeros(len(found))

@@ -40,14 +40,23 @@ class Changes:
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
         arguments = tuple(coordinates.arguments)
-        own = Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
-        self._impulses = coordinates.kept("impulses", lambda: own if turning(dae, pieces) else None)
+        self._impulses: Impulses | None = coordinates.kept(
+            "impulses",
+            lambda: (
+                Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
+                if turning(dae, pieces)
+                else None
+            ),
+        )
+        free = self._impulses is None and not dae.flat.slips
+        self._idle = coordinates.idle if free else np.zeros_like(coordinates.idle)
+        self._timed = np.array(
+            [all(coordinates.switches.timed[k] for k in own) for own in coordinates.rounds.of]
+        )
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
-        self._acted: dict[
-            int, tuple[float, np.ndarray]
-        ] = {}  # when: last time, and rates of all margins behind it
+        self._acted: dict[int, tuple[float, np.ndarray]] = {}  # when: last time, rates of margins behind it
         self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
 
     def modes(self, k: int) -> np.ndarray:
@@ -147,9 +156,13 @@ class Changes:
                 if k > 0:
                     trail.repeat(k, written=np.array_equal(switches.written(margins.values[0]), first))
                     k = k + 1
-                self._agree(k, modes)
+                idle = self._idle[trail.held.shape[1] - modes.size :][modes != first].all()
+                if idle:
+                    self.modes(k)[:] = modes
+                else:
+                    self._agree(k, modes)
                 sampled = trail.due[left].any()  # results have the side behind only
-                jumped = self._thrown or switches.jumped(self.point(left), self.point(k))
+                jumped = not idle and (self._thrown or switches.jumped(self.point(left), self.point(k)))
                 if k > left and not sampled and jumped:
                     trail.show(left, k)
             if by_states:
@@ -184,11 +197,10 @@ class Changes:
                 waits = self.coordinates.slips.postponed(rose, self.point(k))
                 rose, self._holding = rose & ~waits, now & ~waits
             made = rounds.made(self.point(k), rose)
-            failing = next(
-                (one for one, acts in zip(rounds.whens, made.acts, strict=True) if acts and one.failure), None
-            )
-            if failing is not None:
-                raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), failing)
+            acting = [rounds.whens[i] for i in np.flatnonzero(made.acts)]
+            for one in acting:
+                if one.failure:
+                    raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), one)
             self._refuse_bad(made, k)
             if k == left:
                 trail.repeat(k, written=True)
@@ -197,16 +209,21 @@ class Changes:
                 _, trail.held[left], trail.z[left] = self._unsampled
             trail.show(left, k)
             self._make(made, k, rose)
-        labels = [one.label for one, again in zip(rounds.whens, rose, strict=True) if again]
-        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), labels)
+        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), self._labels(rose))
 
     def _make(self, made: Made, k: int, rose: np.ndarray) -> None:
         """Give a place the values of a round, and what follows from them."""
         coordinates, trail = self.coordinates, self.trail
         t, held = float(trail.t[k]), len(coordinates.held)
-        before = self.margins(np.array([k])) if len(coordinates.switches) else None
-        first = trail.held[k].copy()
-        trail.held[k, held : held + len(coordinates.discretes)] = made.discretes
+        first, acting = trail.held[k].copy(), [coordinates.rounds.whens[i] for i in np.flatnonzero(made.acts)]
+        self.ended = "; ".join(one.message for one in acting if one.message)
+        own = slice(held, held + len(coordinates.discretes))
+        idle = (self._idle[own] | (made.discretes == first[own])).all() and self._timed[made.acts != 0].all()
+        idle = idle and not any(one.reinits for one in acting)
+        before = self.margins(np.array([k])) if len(coordinates.switches) and not idle else None
+        trail.held[k, own] = made.discretes
+        if idle:
+            return
         if coordinates.rounds.places.size:
             trail.x[k, coordinates.rounds.places] = made.states
             try:
@@ -214,27 +231,18 @@ class Changes:
             except SolveError as error:
                 raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
         if coordinates.dae.flat.slips:
-            kicked = [
-                bool(acts and one.reinits)
-                for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
-            ]
-            if any(kicked):
+            if any(one.reinits for one in acting):
                 self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
             self._lock(k, first)
         trail.z[k] = self._settled(k)
         if before is not None:
             after = self.margins(np.array([k]))
-            own = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
-            self._watch_hops((made.acts != 0) & own, t, before, after)
+            models = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
+            self._watch_hops((made.acts != 0) & models, t, before, after)
             errors = location_errors(before, after, t, coordinates.switches.whole(before.values))
             modes = coordinates.switches.following(after.blurred(errors))
             if not np.array_equal(modes, self.modes(k)):
                 self._agree(k, modes, errors)
-        self.ended = "; ".join(
-            one.message
-            for one, acts in zip(coordinates.rounds.whens, made.acts, strict=True)
-            if acts and one.message
-        )
 
     def _lock(self, k: int, first: np.ndarray) -> None:
         """Hold what has come to rest, but what breaks away again at once: that turns back; first: what was held before."""
@@ -274,15 +282,10 @@ class Changes:
 
     def _refuse_bad(self, made: Made, k: int) -> None:
         """SolveError for a new value that is not finite."""
-        names = [
-            *self.coordinates.discretes,
-            *(self.coordinates.states[i] for i in self.coordinates.rounds.places),
-        ]
-        for name, value in zip(names, [*made.discretes, *made.states], strict=True):
-            if not np.isfinite(value):
-                raise run_ends.set_badly(
-                    self.coordinates.dae, float(self.trail.t[k]), name, self._labels(made.acts)
-                )
+        c, bad = self.coordinates, np.flatnonzero(~np.isfinite(np.concatenate([made.discretes, made.states])))
+        if bad.size:
+            names = [*c.discretes, *(c.states[i] for i in c.rounds.places)]
+            raise run_ends.set_badly(c.dae, float(self.trail.t[k]), names[bad[0]], self._labels(made.acts))
 
     def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
@@ -293,12 +296,10 @@ class Changes:
             last, began = self._acted.get(i, (-np.inf, rates))
             if t == last:  # another round of one instant
                 continue
-            if own:
-                fastest = np.maximum(np.abs(began[own]), np.abs(rates[own]))
-                away = fastest * (t - last) / 4  # of a parabola: the farthest
-                self._hops[i] = self._hops[i] + 1 if np.all(away < HOP * noise[own]) else 0
-            else:
-                self._hops[i] = 0
+            away = (
+                np.maximum(np.abs(began[own]), np.abs(rates[own])) * (t - last) / 4
+            )  # farthest, of a parabola
+            self._hops[i] = self._hops[i] + 1 if own and np.all(away < HOP * noise[own]) else 0
             if self._hops[i] >= HOPS:
                 raise run_ends.accumulating(self.coordinates.dae, t, self.coordinates.rounds.whens[i].label)
             self._acted[i] = t, after.rates[0].copy()
@@ -331,10 +332,9 @@ class Changes:
                 modes[changing] = choice
                 if np.array_equal(self._led_to(k, modes, errors, before), modes):
                     return
+        # margins may follow from large numbers that cancel: then rates decide
         known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
-        if np.any(
-            self._rounded > known
-        ):  # margins may follow from large numbers that cancel: then rates decide
+        if np.any(self._rounded > known):
             self.trail.x[k], self.trail.z[k] = before[:2]
             self._agree(k, tried[1], errors)
             return
@@ -361,10 +361,10 @@ class Changes:
         drifted, z, t, w = (a.copy() for a in self.columns(np.array([k])))
         trail.x[k] = coordinates.project(drifted, t, w)[0]
         if self._impulses:  # margins are known no better than constraints
-            looks = [
+            near, far = (
                 coordinates.switches.look(x, z, t, w, self.sizes).values for x in (drifted, trail.x[places])
-            ]
-            errors = np.maximum(errors, 1.1 * np.abs(looks[1] - looks[0])[0])
+            )
+            errors = np.maximum(errors, 1.1 * np.abs(far - near)[0])
         trail.z[k] = self._settled(k)
         return coordinates.switches.following(self.margins(np.array([k])).blurred(errors))
 

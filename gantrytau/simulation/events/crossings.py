@@ -12,6 +12,7 @@ from gantrytau.simulation.singular_poses import Point
 DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at
 MOST = 100  # steps to one crossing
 HALVINGS = 50  # of a share of an interval: to rounding
+BEFORE = 1e-8  # of an interval: a first step ends before a crossing, so that a short one is left
 JUST_BEHIND = 16  # times rounding: near enough behind the crossing
 
 
@@ -74,6 +75,7 @@ def located(
     each from the last point before the crossing, so that what is left to go is found to the rounding of time.
     """
     end = high[2]  # up to which steps lead
+    guess -= BEFORE * (end - low[2])
     width = end - low[2]
     for count in range(MOST):
         least = 4 * np.spacing(max(abs(low[2]), abs(end)))

@@ -12,8 +12,6 @@ the turn: impacts are plastic. Where J changes by the jump itself, it is led alo
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -25,12 +23,9 @@ from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.events.modes import InModes
 from gantrytau.simulation.singular_poses import Point
 
-NOTHING = (
-    1e-12  # of the terms and what they change by in the run: less is how well a turn is located, no jump
-)
+NOTHING = 1e-12  # of the terms and their change in the run: less is how well a turn is located, no jump
 ROUNDING = 1e-9  # of its terms: a smaller impulse is none
-PARTS = (4, 8, 16, 32, 64, 128)  # of a jump, until twice as many lead to the same place
-SAME = 1e-11
+SAME = 1e-11  # of a jump: how well it is led along its way
 
 
 class Infinite(Exception):
@@ -58,62 +53,43 @@ def turning(dae: Translated, pieces: InModes) -> list[ca.SX]:
     return [turn.mode for turn in pieces.switched.switches if turn.mode.name() in found]
 
 
-@dataclass(frozen=True, eq=False)
 class Levels:
-    """The equations of jumps in reduced symbols; residuals: with modes; known: names of what is known."""
+    """The equations of jumps in reduced symbols: `unknowns`, and all their derivatives, `names`.
 
-    dae: Translated
-    residuals: Mapping[Key, ca.SX]
-    known: tuple[str, ...]
+    orders: d_j; counts: c_i; ends: places of the highest derivatives among all symbols; symbols: all, and what is known;
+    jacobian: J.
+    """
 
-    @cached_property
-    def names(self) -> list[str]:
-        """All symbols, each variable with its derivatives."""
-        return self.dae.indexed.unknown_symbols()
-
-    @cached_property
-    def orders(self) -> np.ndarray:
-        """d_j."""
-        return np.array(list(self.dae.indexed.orders.values()), dtype=int)
-
-    @cached_property
-    def counts(self) -> np.ndarray:
-        """c_i."""
-        return np.array(self.dae.indexed.counts, dtype=int)
-
-    @cached_property
-    def ends(self) -> np.ndarray:
-        """Places of the highest derivatives among all symbols."""
-        return np.cumsum(self.orders + 1) - 1
+    def __init__(self, dae: Translated, residuals: Mapping[Key, ca.SX], known: Sequence[str]):
+        """residuals: with modes; known: names of what is known."""
+        self.residuals, self.known = residuals, tuple(known)
+        self.names = dae.indexed.unknown_symbols()
+        self.unknowns = list(dae.indexed.orders)
+        self.orders = np.array(list(dae.indexed.orders.values()), dtype=int)
+        self.counts = np.array(dae.indexed.counts, dtype=int)
+        self.ends = np.cumsum(self.orders + 1) - 1
+        self.symbols = tuple(
+            column([dae.reduced.chains.named(n) for n in names]) for names in (self.names, known)
+        )
+        last = column([residuals[i, int(c)] for i, c in enumerate(self.counts)])
+        self.jacobian = ca.jacobian(last, self.symbols[0][self.ends.tolist()])
 
     def places(self, k: int) -> np.ndarray:
-        """Those of the derivatives that jump at a level, -1 for impulses."""
+        """Places of the derivatives that jump at a level, -1 for impulses."""
         return np.where(self.orders >= k, self.ends - k, -1)
-
-    @cached_property
-    def symbols(self) -> tuple[ca.SX, ca.SX]:
-        """All symbols, and what is known."""
-        named = self.dae.reduced.chains.named
-        return column([named(n) for n in self.names]), column([named(n) for n in self.known])
-
-    @cached_property
-    def jacobian(self) -> ca.SX:
-        """J."""
-        last = column([self.residuals[i, int(c)] for i, c in enumerate(self.counts)])
-        return ca.jacobian(last, self.symbols[0][self.ends.tolist()])
 
     def lacking(self, k: int) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Of the constraints of a level: residuals, sizes of their terms, and of the rates of these in 1/s; else zeros."""
         rows = [self.residuals[i, int(c) - k] if c >= k else ca.SX(0) for i, c in enumerate(self.counts)]
         residual, terms, rates = column(rows), ca.SX(len(rows), 1), ca.fabs(ca.jacobian(column(rows), time))
         for symbols, names in zip(self.symbols, (self.names, self.known), strict=True):
-            slopes = ca.fabs(ca.jacobian(residual, symbols))
-            place = {name: i for i, name in enumerate(names)}
-            further = [
-                place.get(derivative_name(b, order + 1), -1) for b, order in map(split_derivative, names)
-            ]
+            slopes, named = (
+                ca.fabs(ca.jacobian(residual, symbols)),
+                dict(zip(names, symbols.elements(), strict=True)),
+            )
+            further = [derivative_name(b, order + 1) for b, order in map(split_derivative, names)]
             terms += slopes @ ca.fabs(symbols)
-            rates += slopes @ ca.fabs(column([symbols[i] if i >= 0 else ca.SX(0) for i in further]))
+            rates += slopes @ ca.fabs(column([named.get(name, ca.SX(0)) for name in further]))
         return residual, terms, rates
 
     def balance(self, k: int, jumps: Sequence[ca.SX], steps: ca.SX) -> ca.SX:
@@ -121,7 +97,7 @@ class Levels:
 
         jumps: by level, from the first; steps: by how much what is known jumps.
         """
-        found, place = ca.SX(self.counts.size, 1), {name: i for i, name in enumerate(self.known)}
+        found, driven = ca.SX(self.counts.size, 1), dict(zip(self.known, steps.elements(), strict=True))
         for c in sorted({int(c) for c in self.counts if c < k}):
             along = [ca.SX(0)] * len(self.names)
             for j, (end, top) in enumerate(zip(self.ends.tolist(), self.orders.tolist(), strict=True)):
@@ -129,72 +105,48 @@ class Levels:
                     order = top - c - (higher - k)
                     if order >= 0:
                         along[end - top + order] = jumps[higher - 1][j]
-            below = (
-                derivative_name(b, n - k + c) if n >= k - c else ""
-                for b, n in map(split_derivative, self.known)
-            )
-            driven = [steps[place[name]] if name in place else ca.SX(0) for name in below]
+            for base, order in map(split_derivative, self.known):
+                below = derivative_name(base, order - k + c) if order >= k - c else ""
+                along.append(driven.get(below, ca.SX(0)))
             rows = [i for i, count in enumerate(self.counts.tolist()) if count == c]
             first = column([self.residuals[i, 0] for i in rows])
-            way = ca.vertcat(*along, *driven)
-            found[rows] = (
-                -ca.jtimes(first, ca.vertcat(*self.symbols), way) if way.numel() else ca.SX(len(rows), 1)
-            )
+            if along:
+                found[rows] = -ca.jtimes(first, ca.vertcat(*self.symbols), ca.vertcat(*along))
         return found
 
 
-@dataclass(frozen=True, eq=False)
 class Impulses:
-    """The jumps of a model; arguments: x, z, time, t0, w, to which `ways` lead one after another, the last from modes that
-    are not kept; x: names of the states.
+    """The jumps of a model. most: the highest level at which something may jump; states: their places among all symbols;
+    symbols, jacobian: all symbols and what is known, at a point, and J, as functions.
     """
 
-    dae: Translated
-    pieces: InModes
-    ways: tuple[Substitution, ...]
-    arguments: tuple[ca.SX, ...]
-    x: tuple[str, ...]
-
-    @cached_property
-    def levels(self) -> Levels:
-        """Their equations."""
-        return Levels(self.dae, self.pieces.residuals, tuple(self.pieces.known))
-
-    @cached_property
-    def most(self) -> int:
-        """The highest level at which something may jump."""
-        known = (order for _, order in map(split_derivative, self.levels.known))
-        return int(self.levels.counts.max(initial=0)) + max(known, default=0)
-
-    @cached_property
-    def states(self) -> np.ndarray:
-        """Places of the states among all symbols."""
-        places = {n: k for k, n in enumerate(self.levels.names)}
-        return np.array([places[n] for n in self.x], dtype=int)
+    def __init__(
+        self,
+        dae: Translated,
+        pieces: InModes,
+        ways: Sequence[Substitution],
+        arguments: Sequence[ca.SX],
+        states: Sequence[str],
+    ):
+        """arguments: x, z, time, t0, w, to which `ways` lead one after another, the last from modes that are not kept."""
+        self.dae, self._outside, self._arguments = dae, ways[-1], arguments
+        self.levels = levels = Levels(dae, pieces.residuals, tuple(pieces.known))
+        known = (order for _, order in map(split_derivative, levels.known))
+        self.most = int(levels.counts.max(initial=0)) + max(known, default=0)
+        self.states = np.array([levels.names.index(n) for n in states], dtype=int)
+        found = [levels.symbols[0], column(list(pieces.known.values()))]
+        for way in ways:
+            found = way.inserted([ca.densify(e) for e in found])
+        self.symbols = ca.Function("symbols", list(arguments), found, {"cse": True})
+        self.jacobian = self._function([levels.jacobian])
+        self._at_levels: dict[int, ca.Function] = {}
 
     def _function(self, expressions: Sequence[ca.SX], more: Sequence[ca.SX] = ()) -> ca.Function:
         """Expressions of symbols and of what is known, as a function of these at a point."""
         table = self.dae.table
         steady = Substitution(tuple((table.symbols[n], ca.SX(table.values[n])) for n in table.independent))
-        found = self.ways[-1].inserted(steady.inserted([ca.densify(e) for e in expressions]))
-        return ca.Function("jumps", [*self.arguments[2:], *self.levels.symbols, *more], found, {"cse": True})
-
-    @cached_property
-    def symbols(self) -> ca.Function:
-        """All symbols, and what is known, at a point."""
-        found = [self.levels.symbols[0], column(list(self.pieces.known.values()))]
-        for way in self.ways:
-            found = way.inserted([ca.densify(e) for e in found])
-        return ca.Function("symbols", list(self.arguments), found, {"cse": True})
-
-    @cached_property
-    def jacobian(self) -> ca.Function:
-        """J as a function."""
-        return self._function([self.levels.jacobian])
-
-    @cached_property
-    def _at_levels(self) -> dict[int, ca.Function]:
-        return {}
+        found = self._outside.inserted(steady.inserted([ca.densify(e) for e in expressions]))
+        return ca.Function("jumps", [*self._arguments[2:], *self.levels.symbols, *more], found, {"cse": True})
 
     def at_level(self, k: int) -> ca.Function:
         """What constraints lack, and what other levels add, by jumps (n, levels) and steps of what is known."""
@@ -262,45 +214,30 @@ class _Jump:
         self.y, self._jumps[:, k - 1], self.found = y, jump, True
 
     def _led(self, b: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where J Y = b leads, in as many parts as it takes (Runge and Kutta), and Y of the whole way."""
-        own, found = places >= 0, list[np.ndarray]()
+        """End of the way J Y = b from share 0 to 1 of the jump, and Y of the whole way."""
+        from scipy.integrate import solve_ivp
 
-        def slope(y: np.ndarray) -> np.ndarray:
-            return np.linalg.solve(self._jacobian(y), b)
+        own, n = places >= 0, self.y.size
 
-        def same(some: np.ndarray, others: np.ndarray) -> bool:
-            return bool(np.all(np.abs(some - others) <= SAME * np.abs(some).max(initial=0.0)))
+        def slope(_: float, y: np.ndarray) -> np.ndarray:
+            jump, rates = np.linalg.solve(self._jacobian(y[:n]), b), np.zeros(n)
+            rates[places[own]] = jump[own]
+            return np.append(rates, jump)
 
-        y, jump = self.y.copy(), slope(self.y)
-        for share in (0.37, 0.63):
-            y[places[own]] += share * jump[own]
-            if not same(jump, slope(y)):
-                break
-        else:
-            return y, jump
-        for parts in PARTS:
-            y, jump = self.y.copy(), np.zeros(b.size)
-            for _ in range(parts):
-                steps: list[np.ndarray] = []
-                for share in (0.0, 0.5, 0.5, 1.0):
-                    there = y.copy()
-                    if steps:
-                        there[places[own]] += share / parts * steps[-1][own]
-                    steps.append(slope(there))
-                step = (steps[0] + 2 * steps[1] + 2 * steps[2] + steps[3]) / (6 * parts)
-                y[places[own]] += step[own]
-                jump += step
-            if found and same(jump, found[-1]):
-                break
-            found.append(jump)
-        return y, jump
+        begin = np.append(self.y, np.zeros(b.size))
+        first = slope(0.0, begin)
+        least = SAME * np.abs(first).max()
+        end = begin + first
+        if any(np.any(np.abs(slope(s, begin + s * first) - first) > least) for s in (0.37, 1.0)):
+            end = solve_ivp(slope, (0.0, 1.0), begin, method="DOP853", rtol=SAME, atol=least).y[:, -1]
+        return end[:n], end[n:]
 
     def _check(self, k: int, jump: np.ndarray, b: np.ndarray) -> None:
         """Infinite for what would have to be more than an impulse, and for impulses in laws that are not linear in them."""
         dae, levels = self.of.dae, self.levels
         jacobian = self._jacobian(self.y)
         acting = np.abs(jump) > ROUNDING * (np.abs(np.linalg.inv(jacobian)) @ np.abs(b))
-        names = list(dae.indexed.orders)
+        names = levels.unknowns
         jumping = [levels.known[i] for i in np.flatnonzero(self._steps)]
         moved = np.flatnonzero(acting & (levels.orders >= k))
         jumping += [derivative_name(names[j], int(levels.orders[j]) - k) for j in moved]

@@ -1,4 +1,4 @@
-"""How close looks at what switches must lie, so that nothing turns there and back between two of them.
+"""Looks: places at which switches are asked, so close that none turns there and back between two of them.
 
 The argument of a sine, a cosine or a tangent within a margin moves by less than a share of its period from one look to the
 next, and the cubic through the values and rates at two looks foretells the one between them.
@@ -11,7 +11,7 @@ from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.crossings import Crossing
 from gantrytau.simulation.events.margins import Margins
-from gantrytau.simulation.events.phases import SHARE, moved, phases
+from gantrytau.simulation.events.phases import SHARE, moved, phases_along
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.trail import Trail
 
@@ -70,17 +70,13 @@ class Looks:
 
 
 def _phases_of(coordinates: Coordinates) -> AtPlaces | None:
-    """(x, z, t, t0, w) -> arguments of periodic functions in what switches by states, and their rates; None without any."""
+    """Phases within what switches by states."""
     c = coordinates
     by_states = [i for i, timed in enumerate(c.switches.timed) if not timed]
     within = ca.vertcat(ca.SX(0, 1), c.switches.margins[by_states])
     within = ca.vertcat(within, c.algebraic) if ca.depends_on(within, c.z) else within
-    found = phases(within, ca.vertcat(c.x, c.z, time))
-    if not found.numel():
-        return None
-    along = ca.jtimes(found, ca.vertcat(c.x, time), ca.vertcat(c.ode, 1))
-    arguments = [c.x, c.z, time, c.t0, c.w]
-    return AtPlaces(ca.Function("phases", arguments, [ca.densify(found), ca.densify(along)], {"cse": True}))
+    moving, along = ca.vertcat(c.x, c.z, time), ca.vertcat(c.ode, ca.SX(c.z.numel(), 1), 1)
+    return phases_along(within, c.arguments, moving, along)
 
 
 def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:

@@ -89,9 +89,8 @@ class Switches:
             by_z = found[3].reshape(places, m, len(self)).transpose(0, 2, 1)
             inner = found[4].reshape(places, m, m).transpose(0, 2, 1)
             change = found[5][:, :, None]
-            with contextlib.suppress(
-                np.linalg.LinAlgError
-            ):  # what a margin loses by this is found in more steps
+            # what a margin loses by a singular matrix is found in more steps
+            with contextlib.suppress(np.linalg.LinAlgError):
                 rates -= (by_z @ np.linalg.solve(inner, change))[:, :, 0]
         rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from gantrytau.language.instructions import computed
+from gantrytau.language.instructions import applied, computed
 
 MOST = 3  # denominators in one margin: products of many would overflow
 _Fraction = tuple[ca.SX, tuple[ca.SX, ...]]  # a numerator, and what it is divided by
@@ -43,7 +43,7 @@ def _operation(operator: int, operands: list[_Fraction]) -> _Fraction:
     if found is not None and len(found[1]) <= MOST:
         return found
     whole = [e / _product(ds) if ds else e for e, ds in operands]
-    return (ca.SX.unary(operator, *whole) if len(whole) == 1 else ca.SX.binary(operator, *whole)), ()
+    return applied(operator, whole), ()
 
 
 def _within(one: ca.SX, others: list[ca.SX] | tuple[ca.SX, ...]) -> bool:

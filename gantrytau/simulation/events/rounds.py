@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.flattening.flat_model import When
-from gantrytau.flattening.whens import Jump, one_round
+from gantrytau.flattening.whens import one_round
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
 from gantrytau.simulation.singular_poses import Point
@@ -69,12 +69,12 @@ def rounds_of(
     after another, from reduced symbols to the arguments, x, z, time, t0, w.
     """
     jump = one_round(dae.flat)
-    names, values = [n for n, _ in jump.states], _of_roots(dae, jump)
+    roots = [dae.reduced.aliases[name] for name, _ in jump.states]
+    values = [dae.to_reduced(a.root_value(value)) for a, (_, value) in zip(roots, jump.states, strict=True)]
     found = [dae.to_reduced(jump.acts), dae.to_reduced(jump.discretes), column(values)]
     for substitution in substitutions:
         found = substitution.inserted(found)
     acts, discretes, new = found
-    roots = [dae.reduced.aliases[n] for n in names]
     rose = [jump.rose] if dae.flat.whens else [ca.SX.sym("rose", 0)]
     made = [ca.densify(e) for e in (acts, discretes, new)]
     first = len(dae.flat.whens)
@@ -89,15 +89,6 @@ def rounds_of(
         past,
         AtPlaces(ca.Function("jump", [*arguments, *rose], made, {"cse": True})),
     )
-
-
-def _of_roots(dae: Translated, jump: Jump) -> list[ca.SX]:
-    """The new values of the states behind the variables that are set, in reduced symbols."""
-    found = []
-    for name, value in jump.states:
-        alias = dae.reduced.aliases[name]
-        found.append(dae.to_reduced(alias.root_value(value)))
-    return found
 
 
 def _switches_of(conditions: ca.SX, switches: Switches) -> tuple[tuple[int, ...], ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches
-from gantrytau.simulation.events.phases import moved, phases
+from gantrytau.simulation.events.phases import moved, phases_along
 
 DENSE = 20_000  # steps of the run in which a margin that is not linear in time is looked for zeros, at least
 FIRST = 200  # of them at once, then more
@@ -20,22 +20,26 @@ HALVINGS = 60
 
 
 class TimeEvents:
-    """The turns of the switches of a run from `begin` to `end` whose margins depend on time, and on modes, alone."""
+    """Turns of the switches of a run from `begin` to `end` whose margins depend on time, and on modes, alone.
+
+    all_foreseen: whether there are no others.
+    """
 
     def __init__(self, switches: Switches, w: ca.SX, begin: float, end: float):
         chosen = [i for i, timed in enumerate(switches.timed) if timed]
         margins = switches.margins[chosen]
         rates = ca.jacobian(margins, time)
         self.begin, self.end = begin, end
+        self.all_foreseen = len(chosen) == len(switches) and not any(switches.turns[i].counts for i in chosen)
         self._counts = np.array([switches.turns[i].counts for i in chosen], dtype=bool)
         self._linear = np.array([not ca.depends_on(r, time) for r in rates.elements()], dtype=bool)
-        self._function = ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)])
+        self._function = AtPlaces(ca.Function("by_time", [time, w], [ca.densify(margins), ca.densify(rates)]))
         self._alone = [
             AtPlaces(ca.Function("margin", [time, w], [ca.densify(margin), ca.densify(rate)]))
             for margin, rate in zip(margins.elements(), rates.elements(), strict=True)
         ]
         self._of = [np.flatnonzero(ca.which_depends(m, w)) for m in margins.elements()]
-        self._phases = [_phases_of(margin, w) for margin in margins.elements()]
+        self._phases = [phases_along(m, [time, w], time, ca.SX(1)) for m in margins.elements()]
         self._windows: dict[tuple[int, bytes], _Window] = {}
 
     def next(self, t: float, w: np.ndarray) -> float | None:
@@ -43,8 +47,7 @@ class TimeEvents:
         if not self._linear.size:
             return None
         least = t + 8 * np.spacing(max(abs(t), abs(self.end)))
-        found = []
-        offsets, slopes = (np.array(f).ravel() for f in self._function(0.0, w))
+        found, offsets, slopes = [], *(f[0] for f in self._function(np.zeros(1), w[None]))
         for i in np.flatnonzero(self._linear & (slopes != 0)):
             level = 0.0
             if self._counts[i]:  # the next whole number
@@ -116,10 +119,3 @@ def _closer(t: np.ndarray, phases: Callable[[np.ndarray], list[np.ndarray]], mos
             continue
         t = np.interp(np.arange(ahead[count - 1] + 1), np.append(0, ahead[:count]), t[: count + 1])
     return t
-
-
-def _phases_of(margin: ca.SX, w: ca.SX) -> AtPlaces | None:
-    """(time, w) -> phases of a margin and their rates; None without any."""
-    found = phases(margin, time)
-    rates = ca.densify(ca.jacobian(found, time))
-    return AtPlaces(ca.Function("phases", [time, w], [ca.densify(found), rates])) if found.numel() else None

@@ -106,18 +106,13 @@ class PastValues:
         values = np.abs(np.concatenate([begin[..., 0], end[..., 0]])).max(axis=0)
         size = np.maximum(self.size, values)
         # between the cubic and the quintic in the middle; the error of the latter is about the 3/2 power of this
-        apart = (
-            np.abs(
-                h[:, None] ** 2 * (begin[..., 2] + end[..., 2])
-                - h[:, None] * (end[..., 1] - begin[..., 1]) * 2
-            )
-            / 64
-        )
-        apart = apart / np.where(size > 0, size, 1.0)
-        wide = np.any(apart**1.5 > self.tolerance, axis=1) & (h > LEAST * self.shortest)
+        h = h[:, None]
+        apart = h**2 * (begin[..., 2] + end[..., 2]) - 2 * h * (end[..., 1] - begin[..., 1])
+        apart = np.abs(apart) / 64 / np.where(size > 0, size, 1.0)
+        wide = np.any(apart**1.5 > self.tolerance, axis=1) & (h[:, 0] > LEAST * self.shortest)
         for k in reversed(np.flatnonzero(wide).tolist()):
             place = here + k
-            trail.insert(place, np.array([trail.t[place] + h[k] / 2]))
+            trail.insert(place, np.array([trail.t[place] + h[k, 0] / 2]))
         return bool(wide.any())
 
     def _along(self, places: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -44,9 +44,8 @@ def passage(coordinates: Coordinates) -> Passage:
     if behind is not None:
         before = ca.if_else(jump, behind(far, z, t + h, before), before)
         z = equations.algebraics(far, t + h, t + h, before)
-        led_on = (
-            ca.norm_inf(behind(far, z, t + h, before) - before) > 0
-        )  # modes and unknowns lead to others again
+        # whether modes and unknowns lead to others again
+        led_on = ca.norm_inf(behind(far, z, t + h, before) - before) > 0
         far = far + ca.if_else(ca.logic_and(jump, led_on), math.nan, 0.0)
     renewal = _renewal(coordinates, by_held)(far, z, t + h, before, due)
     y = ca.vertcat(x, own)

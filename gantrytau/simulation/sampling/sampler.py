@@ -20,6 +20,7 @@ FIRST = 8  # passages in a first call, and times more in the next
 SAFETY = 0.9  # of the step that the last error suggests
 SHRINK, GROW = 0.2, 5.0  # of a step, at once
 TRIALS = 12  # of one step
+FAR = 2.0  # times what a gap moves by in the longest step: none that stays farther from zero turns
 LONGEST_WAIT = 1000  # stretches of the integrator
 
 
@@ -186,20 +187,27 @@ class Sampler:
 
     def _first_turn(self, found: StepsTaken, told: np.ndarray, count: int) -> int | None:
         """The first of `count` steps in which something switches that does not follow what is held; None if none does."""
-        c = self.coordinates
-        switches, n, half = c.switches, len(c.states), len(c.sampled)
-        m, discretes = len(c.held), len(c.discretes)
-        live = self._live
-        if not live.any() or not count:
+        if not self._live.any() or not count:
             return None
-        # before and behind each step, one after another
-        at = np.stack([told[:count, 0], told[:count, 0] + told[:count, 1]], axis=1).ravel()
-        x = np.stack([found.before[:count, :n], found.after[:count, :n]], axis=1).reshape(2 * count, n)
-        row, own, z = (np.repeat(a[:count], 2, axis=0) for a in (told, found.before[:, n:], found.algebraics))
-        values, slopes = row[:, 3 + m : 3 + m + half], row[:, 3 + m + half : 3 + m + 2 * half]
-        w = np.hstack([values + slopes * (at - row[:, 2])[:, None], slopes, own])
-        margins = switches.look(x, c.settle(x, z, at, w), at, w, self.sizes)
-        gaps = switches.gaps(margins, own[:, m + discretes :])
-        chosen = np.concatenate([live, live[[turn.counts for turn in switches.turns]]])
-        first = first_crossing(at, Margins(*(a[:, chosen] for a in (gaps.values, gaps.rates, gaps.noise))))
+        n, told = self.sizes.size, told[:count]
+        behind = self._gaps(found, found.after[:count, :n], told, told[:, 1])
+        within = told[:, 1].max() * np.abs(behind.rates).max(axis=0)
+        if np.all(behind.values.min(axis=0) > FAR * within + behind.noise.max(axis=0)):
+            return None
+        before = self._gaps(found, found.before[:count, :n], told, 0.0)
+        at = np.stack([told[:, 0], told[:, 0] + told[:, 1]], axis=1).ravel()  # before and behind each step
+        pairs = ((getattr(gaps, name) for gaps in (before, behind)) for name in ("values", "rates", "noise"))
+        first = first_crossing(at, Margins(*(np.stack([*p], axis=1).reshape(2 * count, -1) for p in pairs)))
         return None if first is None else (first.place + 1) // 2
+
+    def _gaps(self, found: StepsTaken, x: np.ndarray, told: np.ndarray, later: np.ndarray | float) -> Margins:
+        """Gaps of what does not follow what is held, at states x in steps, some time behind their begins, s."""
+        c, switches = self.coordinates, self.coordinates.switches
+        half, m = len(c.sampled), len(c.held)
+        at, own = told[:, 0] + later, found.before[: len(told), self.sizes.size :]
+        values, slopes = told[:, 3 + m : 3 + m + half], told[:, 3 + m + half : 3 + m + 2 * half]
+        w = np.hstack([values + slopes * (at - told[:, 2])[:, None], slopes, own])
+        z = c.settle(x, found.algebraics[: len(told)], at, w)
+        gaps = switches.gaps(switches.look(x, z, at, w, self.sizes), own[:, m + len(c.discretes) :])
+        chosen = np.concatenate([self._live, self._live[[turn.counts for turn in switches.turns]]])
+        return Margins(*(a[:, chosen] for a in (gaps.values, gaps.rates, gaps.noise)))

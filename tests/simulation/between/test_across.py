@@ -62,6 +62,9 @@ def test_windows_pass_their_level_pose(windows):
         found = simulate(windows, stop=1.0, points=51, tolerance=1e-9, singular="cross")
     first = found.final("phi")[0]
     np.testing.assert_allclose((np.sin(first), np.cos(first)), TOP, rtol=0, atol=1e-6)
+    inertia, weight = (N + 1) / 3 + N, 9.81 * ((N + 1) / 2 + N)
+    energy = inertia / 2 * found["w"][:, 0] ** 2 + weight * np.cos(found["phi"][:, 0])
+    assert np.ptp(energy) < 1e-7 * energy[0]  # a hundred times the tolerance; the pose takes none of it
 
 
 def test_they_stop_there_if_nothing_else_is_asked(windows):
