@@ -7,7 +7,7 @@ that only the choice makes. Constraints and their derivatives are kept by projec
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def simulate(
     starts: Mapping[str, Any] | None = None,
     max_step: float | None = None,
     seed: int | None = None,
-    limits: Literal["warn", "stop"] | None = "warn",
+    limits: Literal["warn", "stop", None] = "warn",
     singular: Literal["stop", "cross"] = "stop",
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
@@ -75,7 +75,7 @@ def simulate(
     that are not finite although the states are, and of limits that are passed.
     """
     _check(start, stop, tolerance, points, max_step)
-    _check_words(limits, singular)
+    _check_words(limits=limits, singular=singular)
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -197,11 +197,9 @@ def _check(start: float, stop: float, tolerance: float, points: int, max_step: f
         )
 
 
-def _check_words(limits: object, singular: object) -> None:
-    for argument, found, words in (
-        ("limits", limits, ("warn", "stop", None)),
-        ("singular", singular, ("stop", "cross")),
-    ):
+def _check_words(**given: object) -> None:
+    for argument, found in given.items():
+        words = get_args(simulate.__annotations__[argument])
         if found not in words:
             raise ModelError(
                 f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",

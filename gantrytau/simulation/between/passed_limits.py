@@ -40,7 +40,7 @@ def stopping(dae: Translated) -> Translated:
         for name, side, symbol, limit in found:
             beyond = limit - symbol if side == "min" else symbol - limit
             margin = PASSED * ca.fmax(ca.fabs(limit), ca.fabs(symbol))
-            words = f"{name} passes its {side}, {dae.number(limit):.6g}"
+            words = _words(dae, name, side, limit)
             whens.append(When(beyond > margin, (), (), words, name, dae.name, 0, words=words, initially=True))
         dae.made[key] = translate_flat(replace(dae.flat, whens=tuple(whens)), dae.request)
     return dae.made[key]
@@ -56,15 +56,13 @@ def passed(dae: Translated, result: Result) -> str:
         beyond = bound - values if side == "min" else values - bound
         rows = np.flatnonzero(beyond > PASSED * max(abs(bound), float(np.max(np.abs(values), initial=0.0))))
         if rows.size:
-            unit = result.unit(name)
-            unit = "" if unit in (None, "1") else f" {unit}"
             worst = float(values[np.argmax(beyond)])
             when = _when(result, name, bound, int(rows[0]))
             told.append(
                 (
                     when,
-                    f"{name} passes its {side} of {bound:.6g}{unit} at t = {when:.5g} s and "
-                    f"comes to {worst:.6g}{unit}",
+                    f"{_words(dae, name, side, limit)} at t = {when:.5g} s and comes to "
+                    f"{worst:.6g}{_unit(dae, name)}",
                 )
             )
     if not told:
@@ -72,6 +70,15 @@ def passed(dae: Translated, result: Result) -> str:
     rest = f", and {len(told) - SHOWN} more" if len(told) > SHOWN else ""
     first = "; ".join(words for _, words in sorted(told)[:SHOWN])
     return f"{first}{rest}. limits='stop' ends the run there, an EndStop holds it back"
+
+
+def _words(dae: Translated, name: str, side: str, limit: ca.SX) -> str:
+    return f"{name} passes its {side} of {dae.number(limit):.6g}{_unit(dae, name)}"
+
+
+def _unit(dae: Translated, name: str) -> str:
+    unit = dae.flat.unit(name)
+    return "" if unit in (None, "1") else f" {unit}"
 
 
 def _when(result: Result, name: str, bound: float, row: int) -> float:
