@@ -23,7 +23,7 @@ class Throw(Model):
 UP = 1 - np.sqrt(1 - 8 / 9.81)  # s, where it passes 4 m
 
 
-@pytest.mark.parametrize("points", [3, 501])
+@pytest.mark.parametrize("points", [3, 12, 501])
 def test_limits_are_told_once_with_their_time(points):
     with pytest.warns(DoubtfulResult) as told:
         simulate(Throw(), stop=2.2, points=points)

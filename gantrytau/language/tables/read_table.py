@@ -30,6 +30,10 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
     for line, row in rows[1:]:
         check_cells(path, line, row, len(header), separator)
     if columns is None and len(header) > 2 and all(_is_number(name, separator) for name in header[1:]):
+        if "[" in header[0]:
+            raise ModelError(
+                f"{path}: line {first}: found {header[0]!r}, expected a map without units, in SI"
+            )
         ys = np.array([number_of(path, first, "ys", cell, separator) for cell in header[1:]])
         found = [
             [_filled(path, line, f"{k + 1}", c, separator) for k, c in enumerate(row)]

@@ -84,7 +84,7 @@ def _unit(dae: Translated, name: str) -> str:
 def _when(result: Result, name: str, bound: float, row: int) -> float:
     """When a limit is passed before a row of a result, s."""
     t = result.time
-    if row == 0 or t[row - 1] == t[row] or (result[name][row - 1] - bound) * (result[name][row] - bound) >= 0:
+    if row == 0 or t[row - 1] == t[row]:
         return float(t[row])
     low, high = float(t[row - 1]), float(t[row])
     sign = np.sign(result[name][row] - bound)
