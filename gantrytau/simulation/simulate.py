@@ -64,15 +64,16 @@ def simulate(
     an FMU keeps the states of its export.
     max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
     and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
-    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however often it turns.
+    exp(-((t - 3) / 1e-6)**2), may be stepped over, as may a force that is narrower than a thousandth of the whole way of
+    a run. What switches (`if_else`) is found however often it turns.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
     singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
-    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
-    `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are, and of limits that are passed.
+    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
+    `.ended` says what `terminate` said.
     """
     _check(start, stop, tolerance, points, max_step)
     _check_words(limits=limits, singular=singular)
