@@ -41,6 +41,11 @@ SPELLING = Spelling(
     exactly={"or None": "or none", "simulate(..., singular='cross')": "--singular cross"},
 )
 
+
+def _one_of(name: str, says: str) -> Any:
+    return typer.Option(metavar="|".join(WORDS[name]), autocompletion=words(*WORDS[name]), help=says)
+
+
 FEW = 12  # variables that are shown where no state was kept
 
 
@@ -56,20 +61,10 @@ def simulate(
         float | None, typer.Option(help="Longest step, in s, for pulses shorter than a 10,000th of the run.")
     ] = None,
     limits: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(WORDS["limits"]),
-            autocompletion=words(*WORDS["limits"]),
-            help="Where a variable passes its min or max: tell it, end the run, or do not look.",
-        ),
+        str, _one_of("limits", "Past a min or max: tell it, end there, or do not look.")
     ] = "warn",
     singular: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(WORDS["singular"]),
-            autocompletion=words(*WORDS["singular"]),
-            help="At a pose where forces are not determined: stop, or cross it with the speeds before it.",
-        ),
+        str, _one_of("singular", "At a singular pose: stop, or cross it if smooth.")
     ] = "stop",
     input_: Inputs = None,
     seed: Seed = None,
@@ -95,15 +90,9 @@ def simulate(
         dae = _translated(chosen, drawn, kept, signals)
         check_display(units, dae.flat, drawn)
         policy = dict(
-            stop=stop,
-            start=start,
-            tolerance=tolerance,
-            points=points,
-            max_step=max_step,
-            seed=seed,
-            limits=None if limits == "none" else limits,
-            singular=singular,
+            stop=stop, start=start, tolerance=tolerance, points=points, max_step=max_step, seed=seed
         )
+        policy |= dict(limits=None if limits == "none" else limits, singular=singular)
         told: list[str] = []
         try:
             with noted(DoubtfulResult, told, json, SPELLING):
