@@ -1,9 +1,10 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and picture_output."""
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+import gantrytau
 from gantrytau import DoubtfulResult, SolveError
 from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.display_option import Displayed, check_display, displayed, of_table
@@ -20,6 +21,7 @@ from gantrytau.commands.arguments.options import (
     Settings,
     To,
 )
+from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.arguments.values import check_names, listed, signal
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import as_json, busy, noted, reporting
@@ -28,11 +30,21 @@ from gantrytau.commands.printing.spelling import Spelling
 if TYPE_CHECKING:
     from gantrytau import Dae, Result
 
+WORDS = {
+    name: [str(word).lower() for word in get_args(gantrytau.simulate.__annotations__[name])]
+    for name in ("limits", "singular")
+}
 SPELLING = Spelling(
     ("simulate", "inputs"),
-    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs", "seed")}
+    {name: f"--{name}" for name in ("stop", "start", "tolerance", "points", "outputs", "seed", *WORDS)}
     | {"inputs": "--input", "parameters": "--set", "max_step": "--max-step"},
+    exactly={"or None": "or none", "simulate(..., singular='cross')": "--singular cross"},
 )
+
+
+def _one_of(name: str, says: str) -> Any:
+    return typer.Option(metavar="|".join(WORDS[name]), autocompletion=words(*WORDS[name]), help=says)
+
 
 FEW = 12  # variables that are shown where no state was kept
 
@@ -48,6 +60,12 @@ def simulate(
     max_step: Annotated[
         float | None, typer.Option(help="Longest step, in s, for pulses shorter than a 10,000th of the run.")
     ] = None,
+    limits: Annotated[
+        str, _one_of("limits", "Past a min or max: tell it, end there, or do not look.")
+    ] = "warn",
+    singular: Annotated[
+        str, _one_of("singular", "At a singular pose: stop, or cross it if smooth.")
+    ] = "stop",
     input_: Inputs = None,
     seed: Seed = None,
     outputs: Kept = None,
@@ -74,9 +92,10 @@ def simulate(
         policy = dict(
             stop=stop, start=start, tolerance=tolerance, points=points, max_step=max_step, seed=seed
         )
+        policy |= dict(limits=None if limits == "none" else limits, singular=singular)
         told: list[str] = []
         try:
-            with noted(DoubtfulResult, told, json):
+            with noted(DoubtfulResult, told, json, SPELLING):
                 result = _simulated(dae, signals, outputs=(*kept, *drawn) if kept else None, **policy)
         except SolveError as error:
             result_output.stop(error, SPELLING, output, json)
@@ -105,8 +124,6 @@ def _translated(
 
 
 def _simulated(dae: "Dae", signals: dict[str, Any], **policy: Any) -> "Result":
-    import gantrytau
-
     return gantrytau.simulate(dae, inputs=signals, **policy)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, TypedDict
+from typing import Any, Literal, TypedDict
 
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
@@ -25,6 +25,8 @@ class SimulationKeywords(TypedDict, total=False):
     tolerance: float
     points: int
     max_step: float | None
+    limits: Literal["warn", "stop", None]
+    singular: Literal["stop", "cross"]
 
 
 @dataclass(frozen=True, eq=False)

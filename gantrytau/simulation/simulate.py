@@ -7,7 +7,7 @@ that only the choice makes. Constraints and their derivatives are kept by projec
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def simulate(
     starts: Mapping[str, Any] | None = None,
     max_step: float | None = None,
     seed: int | None = None,
-    limits: Literal["warn", "stop"] | None = "warn",
+    limits: Literal["warn", "stop", None] = "warn",
     singular: Literal["stop", "cross"] = "stop",
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
@@ -62,19 +62,20 @@ def simulate(
     model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
     With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
     an FMU keeps the states of its export.
-    max_step: s, the longest step of the integrator. Without it, steps are short enough for functions of time, of inputs
-    and in the model, that rest and then change for at least a 10,000th of the run; what is shorter and smooth, such as
-    exp(-((t - 3) / 1e-6)**2), may be stepped over. What switches (`if_else`) is found however often it turns.
+    max_step: s, the longest step. Without it, steps are short enough for functions of time, of inputs and in the model,
+    that rest and then change for a 10,000th of the run; what is shorter and smooth may be stepped over, and forces that are
+    narrower than a thousandth of all the way. What switches (`if_else`) is found however often it turns.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
     singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
-    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
-    `.ended` says what `terminate` said.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
     when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
     that are not finite although the states are, and of limits that are passed.
+    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
+    `.ended` says what `terminate` said.
     """
-    _check(start, stop, tolerance, points, max_step, limits, singular)
+    _check(start, stop, tolerance, points, max_step)
+    _check_words(limits=limits, singular=singular)
     dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
     if parameters:
         dae = retranslate(dae, with_values(dae.flat, parameters))
@@ -174,15 +175,7 @@ def _sized_run(
         coordinates, left = coordinates.sized(sizes), left - 1
 
 
-def _check(
-    start: float,
-    stop: float,
-    tolerance: float,
-    points: int,
-    max_step: float | None,
-    limits: object,
-    singular: object,
-) -> None:
+def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:
     def number(value: Any, *kinds: type) -> bool:
         return isinstance(value, (*kinds, float, np.floating)) and bool(np.isfinite(value))
 
@@ -199,11 +192,19 @@ def _check(
         ),
         (step, "max_step", f"max_step={max_step!r}", "a number above zero, in s"),
         (whole, "points", f"points={points!r}", "a whole number of at least 2"),
-        (limits in ("warn", "stop", None), "limits", f"limits={limits!r}", "'warn' or 'stop' or None"),
-        (singular in ("stop", "cross"), "singular", f"singular={singular!r}", "'stop' or 'cross'"),
     ):
         if not right:
             raise ModelError(f"simulate: found {found}, expected {expected}", argument=argument)
+
+
+def _check_words(**given: object) -> None:
+    for argument, found in given.items():
+        words = get_args(simulate.__annotations__[argument])
+        if found not in words:
+            raise ModelError(
+                f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",
+                argument=argument,
+            )
 
 
 def _check_inputs(dae: Translated, signals: Mapping[str, Signal]) -> None:

@@ -287,6 +287,30 @@ def test_a_missing_extra_is_told_before_the_work(fails, tmp_path, monkeypatch):
     assert "pip install 'gantrytau[results]'" in message
 
 
+def test_limits_and_singular_poses_are_met_as_the_options_say(run, answer, fails, tmp_path):
+    (tmp_path / "throw.py").write_text(
+        "from gantrytau import Model, Real, der\n"
+        "class Throw(Model):\n"
+        "    x = Real(unit='m', start=0.0, fixed=True, max=4.0)\n"
+        "    v = Real(unit='m/s', start=9.81, fixed=True)\n"
+        "    def equations(self):\n"
+        "        yield der(self.x) == self.v\n"
+        "        yield der(self.v) == -9.81\n"
+    )
+    thrown = ("simulate", f"{tmp_path / 'throw.py'}:Throw", "--stop", "1")
+    assert "--limits stop ends the run there" in run(*thrown).stderr
+    assert answer(*thrown, "--limits", "stop")["ended"] == "x passes its max of 4 m"
+    assert answer(*thrown, "--limits", "none")["warnings"] == []
+    assert fails(MISUSE, *thrown, "--limits", "end") == "--limits end: expected 'warn' or 'stop' or none"
+    flat = [
+        f"--set={n}={v}"
+        for n, v in {"ground": 1, "crank.length": 0.3, "coupler.length": 1, "rocker.length": 0.3}.items()
+    ]
+    flat = ("simulate", "FourBar", "--stop", "0.4", *flat)
+    assert "cross it with the speeds before it, --singular cross" in fails(FAULT, *flat)
+    assert "crossed" in answer(*flat, "--singular", "cross")["warnings"][0]
+
+
 def test_what_is_not_finite_is_told_beside_the_answer(run, answer, tmp_path):
     (tmp_path / "roots.py").write_text(
         "from gantrytau import Model, Real, der, sqrt\n"

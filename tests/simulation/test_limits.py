@@ -23,7 +23,7 @@ class Throw(Model):
 UP = 1 - np.sqrt(1 - 8 / 9.81)  # s, where it passes 4 m
 
 
-@pytest.mark.parametrize("points", [3, 501])
+@pytest.mark.parametrize("points", [3, 12, 501])
 def test_limits_are_told_once_with_their_time(points):
     with pytest.warns(DoubtfulResult) as told:
         simulate(Throw(), stop=2.2, points=points)
@@ -36,7 +36,7 @@ def test_limits_are_told_once_with_their_time(points):
 def test_a_run_ends_at_a_limit_where_it_shall():
     result = simulate(Throw(), stop=2.2, limits="stop")
     assert result.time[-1] == pytest.approx(UP, abs=1e-5)
-    assert result.ended == "x passes its max, 4"
+    assert result.ended == "x passes its max of 4 m"
 
 
 @pytest.mark.parametrize(("model", "limits"), [(Throw(x=Bounds(-1, 6.0)), "warn"), (Throw(), None)])

@@ -21,6 +21,8 @@ POLICY = (
     "tolerance",
     "points",
     "max_step",
+    "limits",
+    "singular",
     "outputs",
     "seeds",
     "combine",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.errors import ModelError
-from gantrytau.language.tables.columns import Columns, is_number
+from gantrytau.language.tables.columns import Columns, is_number, split_heading
 
 
 def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[Any, np.ndarray]:
@@ -25,6 +25,8 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
         and len(read.header) > 2
         and all(is_number(x, read.separator) for x in read.header[1:])
     ):
+        if split_heading(read.header[0])[1]:
+            raise ModelError(f"{path}: found {read.header[0]!r}, expected a map without units, in SI")
         x, *values = (read.column(name, filled=True, place=k) for k, name in enumerate(read.header))
         ys = [float(y if read.separator == "," else y.replace(",", ".")) for y in read.header[1:]]
         return (x, np.array(ys)), np.column_stack(values)

@@ -38,7 +38,7 @@ def stopping(dae: Translated) -> Translated:
         for name, side, symbol, limit in found:
             beyond = limit - symbol if side == "min" else symbol - limit
             margin = PASSED * ca.fmax(ca.fabs(limit), ca.fabs(symbol))
-            words = f"{name} passes its {side}, {dae.number(limit):.6g}"
+            words = _words(dae, name, side, limit)
             whens.append(When(beyond > margin, (), (), words, name, dae.name, 0, words=words, initially=True))
         dae.made[key] = translate_flat(replace(dae.flat, whens=tuple(whens)), dae.request)
     return dae.made[key]
@@ -54,9 +54,8 @@ def passed(dae: Translated, result: Result) -> str:
         beyond = bound - values if side == "min" else values - bound
         rows = np.flatnonzero(beyond > PASSED * max(abs(bound), float(np.max(np.abs(values), initial=0.0))))
         if rows.size:
-            unit = "" if result.unit(name) in (None, "1") else f" {result.unit(name)}"
             worst, when = float(values[np.argmax(beyond)]), _when(result, name, bound, int(rows[0]))
-            words = f"{name} passes its {side} of {bound:.6g}{unit} at t = {when:.5g} s and comes to {worst:.6g}{unit}"
+            words = f"{_words(dae, name, side, limit)} at t = {when:.5g} s and comes to {worst:.6g}{_unit(dae, name)}"
             told.append((when, words))
     if not told:
         return ""
@@ -65,10 +64,19 @@ def passed(dae: Translated, result: Result) -> str:
     return f"{first}{rest}. limits='stop' ends the run there, an EndStop holds it back"
 
 
+def _words(dae: Translated, name: str, side: str, limit: ca.SX) -> str:
+    return f"{name} passes its {side} of {dae.number(limit):.6g}{_unit(dae, name)}"
+
+
+def _unit(dae: Translated, name: str) -> str:
+    unit = dae.flat.unit(name)
+    return "" if unit in (None, "1") else f" {unit}"
+
+
 def _when(result: Result, name: str, bound: float, row: int) -> float:
     """When a limit is passed before a row of a result, s."""
     t = result.time
-    if row == 0 or t[row - 1] == t[row] or (result[name][row - 1] - bound) * (result[name][row] - bound) >= 0:
+    if row == 0 or t[row - 1] == t[row]:
         return float(t[row])
     low, high = float(t[row - 1]), float(t[row])
     sign = np.sign(result[name][row] - bound)

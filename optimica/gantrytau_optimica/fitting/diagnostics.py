@@ -210,7 +210,8 @@ def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
     gained = max(whole - rest, 0.0) / max(k, 1) / (rest / one.freedom)
     chance = float(fdtrc(k, one.freedom, gained)) if k else float(gained <= 0)
     if chance > NOTHING:
-        yield Fact("explains nothing", one.name, share=max(1 - rest / whole, 0.0), probability=chance)
+        share = max(whole - rest, 0.0) / max(whole, 1e-300)
+        yield Fact("explains nothing", one.name, share=share, probability=chance)
 
 
 def _size(one: _Quantity, noise: np.ndarray, ratios: dict[str, float]) -> Iterator[Fact]:

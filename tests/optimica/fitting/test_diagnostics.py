@@ -116,3 +116,8 @@ def test_facts_have_words():
     assert "m stands at its limit 0, data want -3, 40 deviations beyond" in pull.finding.message
     known = diagnose([fitted(FORCE + noise(1))], known=[pull], remedies={"limit": "look at the sign of f"})
     assert known.findings[0].message.endswith("look at the sign of f")
+
+
+def test_a_signal_that_is_zero_throughout_is_explained_by_nothing():
+    found = diagnose([ResidualSeries("f", noise(1), measured=np.zeros(N), jacobian=X)])
+    assert [(f.kind, f.share) for f in found.facts] == [("explains nothing", 0.0)]

@@ -158,8 +158,8 @@ def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
         yield Finding(
             "millimetres",
             rows[found],
-            f"{names} of {rows_in_words(rows[found])} {extend} over more than {LARGEST:g} m, expected m; divide by 1000 if "
-            "they are mm",
+            f"{names} of {rows_in_words(rows[found])} {extend} over more than {LARGEST:g} m, expected m and rad; divide by "
+            "1000 if they are mm, turn degrees into rad",
         )
 
 

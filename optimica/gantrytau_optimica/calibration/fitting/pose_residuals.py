@@ -149,6 +149,9 @@ def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResidu
         if robust:
             sizes = np.abs(replace(residuals, weights=sure).robust(minimum.x)[0]).max(axis=1) / noise
             weights = sure * np.maximum(1 - (sizes / BISQUARE) ** 2, 0.0)
+            if 2 * np.count_nonzero(weights) <= len(weights):  # far off, where the least sum of amounts leads
+                amounts = np.abs(residuals.poses(minimum.x)).max(axis=1)
+                weights = sure * np.sqrt(np.minimum(np.median(amounts) / np.maximum(amounts, LEAST), 1.0))
         settled = abs(noise - before) < 0.01 * noise and np.abs(weights - residuals.weights).max() < 1e-3
         residuals = replace(residuals, lever=float(np.clip(lever, 1e-3, 1e3)), weights=weights)
         held = minimum.rank == len(x) and minimum.singular.min() > noise / TAPE
