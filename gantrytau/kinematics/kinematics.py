@@ -18,6 +18,7 @@ from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.kinematics.arm_functions import ArmFunctions
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of, limits_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
 from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose
@@ -318,9 +319,15 @@ class Kinematics(Record):
     def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
         names = tuple(scalar for name in names for scalar in self.dae.expand(name))
-        return ModelFunctions(
-            self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names), self._tolerance
+        robot = (
+            self.dae,
+            self._tool,
+            names,
+            home_of(self.dae.evaluate(), self._tool, names),
+            self._tolerance,
         )
+        arm = ArmFunctions(*robot)
+        return arm if arm.in_a_row else ModelFunctions(*robot)
 
 
 def _length(tolerance: float) -> float:

@@ -85,11 +85,7 @@ class ModelFunctions:
             turns = np.zeros((len(x), 6, 6))
             turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
             return solved(turns, by_joints)
-        spins = (
-            moves[:, 3:].reshape(len(x), 3, 3, count).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
-        )
-        spins = np.stack([spins[:, :, i, j] for i, j in SPIN], axis=1)
-        return self._in_reach(np.concatenate([moves[:, :3], spins], axis=1) @ by_joints, r, R)
+        return self._in_reach(twists(moves, R) @ by_joints, r, R)
 
     def whole_pose(self, r, R=None):
         """The pose with the orientation that follows where none is given."""
@@ -131,9 +127,8 @@ class ModelFunctions:
         count = len(self.joints)
         if count > 3 and f"{self.tool}.q" not in self.dae.vectors:
             raise ModelError(
-                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, as the orientation "
-                "follows from joints in a row, expected a tool with coordinates of its own to be given a pose: "
-                f"{self.tool} = Body(..., free=True), or {self.tool}=dict(free=True) where it is made"
+                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, expected a tool with "
+                f"an orientation: a Body behind joints in a row, on a loop {self.tool} = Body(..., free=True)"
             )
         if count == 6:
             return (0, 1, 2, 3, 4, 5)
@@ -157,9 +152,8 @@ class ModelFunctions:
         slopes = self._forward.slopes(*self.home.q[:, None])[0]
         if f"{self.tool}.q" not in self.dae.vectors:
             return slopes[:3]
-        rates = slopes[3:].reshape(3, 3, -1).transpose(2, 1, 0) @ self.home.R.T  # dR R.T, skew
-        spins = np.stack([rates[:, i, j] for i, j in SPIN])
-        return np.vstack([slopes[:3], _turns_of_quaternions(self.home.R[None])[0] @ spins])
+        moves = twists(slopes[None], self.home.R[None])[0]
+        return np.vstack([moves[:3], _turns_of_quaternions(self.home.R[None])[0] @ moves[3:]])
 
     def _forward_from(self, x: np.ndarray, q: np.ndarray):
         """Poses of which the inverse is q, from coordinates x (N, n) near them; NaN where Newton does not end."""
@@ -187,7 +181,7 @@ class ModelFunctions:
         return self._posed(self._following.around(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
-        found = _whole(np.hstack(self._inverse.around(*self._arguments(x))))
+        found = whole(np.hstack(self._inverse.around(*self._arguments(x))))
         return self.within_a_turn(found, limits_of(self.dae, self.joints))
 
     def within_a_turn(self, q: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -199,7 +193,7 @@ class ModelFunctions:
 
     def _slopes_of(self, x: np.ndarray) -> np.ndarray:
         """Slopes of the joints by the coordinates of poses, (N, n, n)."""
-        return _whole(self._inverse.slopes_around(*self._arguments(x)))
+        return whole(self._inverse.slopes_around(*self._arguments(x)))
 
     @cached_property
     def _forward(self) -> ArrayFunction:
@@ -233,7 +227,7 @@ class ModelFunctions:
 
     def _posed(self, found: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Positions and orientations; a tool without orientation keeps that of the world."""
-        both = _whole(np.hstack(found))
+        both = whole(np.hstack(found))
         r = both[:, :3]
         if len(found) > 1:
             return r, both[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1)
@@ -243,6 +237,13 @@ class ModelFunctions:
 
     def _coordinates(self, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
         """Coordinates (N, n) of poses."""
+        self.check(R)
+        if R is None:
+            return r[:, list(self.places)]
+        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
+
+    def check(self, R: np.ndarray | None) -> None:
+        """ModelError where an orientation is missing or one too many."""
         if (R is not None) != self.turning:
             count = len(self.joints)
             raise ModelError(
@@ -250,9 +251,6 @@ class ModelFunctions:
                 f"expected {'one, as joints turn the tool' if R is None else 'none, as it follows from the position'}; "
                 "name others by joints="
             )
-        if R is None:
-            return r[:, list(self.places)]
-        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
 
 
 def limits_of(dae: Dae, joints: Sequence[str]) -> np.ndarray:
@@ -266,7 +264,7 @@ def limits_of(dae: Dae, joints: Sequence[str]) -> np.ndarray:
     return found
 
 
-def _whole(found: np.ndarray) -> np.ndarray:
+def whole(found: np.ndarray) -> np.ndarray:
     """The same with poses NaN of which some numbers are, as where one arm of two is too short."""
     found[~np.isfinite(found).all(axis=tuple(range(1, found.ndim)))] = np.nan
     return found
@@ -287,6 +285,12 @@ def _independent(moves: np.ndarray) -> list[int]:
             along = left[best] / sizes[best]
             left = left - np.outer(left @ along, along)
     return sorted(chosen)
+
+
+def twists(slopes: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Velocity and angular velocity in the world, (N, 6, n), of slopes (N, 12, n) of r and R, column after column."""
+    turns = slopes[:, 3:].reshape(len(R), 3, 3, -1).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
+    return np.concatenate([slopes[:, :3], np.stack([turns[:, :, i, j] for i, j in SPIN], axis=1)], axis=1)
 
 
 def _turns_of_quaternions(R: np.ndarray) -> np.ndarray:

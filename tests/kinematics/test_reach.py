@@ -7,11 +7,11 @@ import pytest
 
 from gantrytau import Model, Start, connect
 from gantrytau.kinematics import Kinematics
-from gantrytau.kinematics.rotations import quaternions
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
-from gantrytau_models import FiveBar
+from gantrytau_models import DeltaRobot, FiveBar
 from tests.families import NIGHTLY, first_of
 from tests.kinematics.test_serial_arms import JOINTS, SixJoints
+from tests.references.delta import ACROSS, OUT
 
 PLACES = 10_000 if NIGHTLY else 400
 UPPER, FORE = 0.4, 0.3
@@ -55,6 +55,14 @@ def two_bars(r, side, a=UPPER, b=FORE):
     elbow = side * np.arccos(cosine)
     shoulder = np.arctan2(r[:, 1], r[:, 0]) - np.arctan2(b * np.sin(elbow), a + b * np.cos(elbow))
     return np.column_stack([shoulder, elbow])
+
+
+def delta_angles(r, side, base=0.2 - 0.06, arm=0.3, rod=0.8):
+    """Angles of the arms of a delta robot below the level, elbows outside or inside, (N, 3); NaN up to its border."""
+    x, y, z = r @ OUT.T - base, r @ ACROSS.T, r[:, 2:]
+    cosine = (x**2 + z**2 + y**2 + arm**2 - rod**2) / (2 * arm * np.hypot(x, z))
+    cosine[np.abs(cosine) > 1 - 1e-4] = np.nan
+    return np.arctan2(-z, x) - side * np.arccos(cosine)
 
 
 def ring(inner, outer, seed=0):
@@ -117,23 +125,22 @@ def test_five_bars_reach_wherever_both_cranks_do(left, right):
     assert np.isnan(k.ik(np.array([[0.5, 0.5, 0.0], [-0.1, 0.05, 0.0]]))).all()
 
 
-@pytest.mark.nightly  # ten seconds to grow its branch in six coordinates
+@pytest.mark.nightly  # some seconds to grow its branch in six coordinates
 def test_an_arm_of_six_joints_reaches_all_of_its_aspect():
-    """Places of joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight."""
-    arm = Kinematics(SixJoints(tool=dict(free=True)), joints=JOINTS)
-    random = np.random.default_rng(2)
-    q = np.column_stack([
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(0.05, np.pi - 0.05, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(0.05, np.pi - 0.05, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-    ])  # fmt: skip
-    ahead = 0.6 * np.cos(q[:, 1]) + 0.5 * np.cos(q[:, 1] + q[:, 2])
-    q = q[ahead > 0.05][:PLACES]
+    """Random joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight."""
+    arm = Kinematics(SixJoints(), joints=JOINTS)
+    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (8 * PLACES, 6))
+    q[:, [2, 4]] = np.abs(q[:, [2, 4]])
+    q = q[0.6 * np.cos(q[:, 1]) + 0.5 * np.cos(q[:, 1] + q[:, 2]) > 0][:PLACES]
     r, R = arm.fk(q)
-    found = arm.ik(r, R)
-    half = quaternions(R)[:, 0] < 1e-2  # nearly half a turn from the axes of the world
-    assert not np.isnan(found[~half]).any()
-    assert np.abs(turned(found - q)[~half]).max() < 1e-7
+    assert np.abs(turned(arm.ik(r, R) - q)).max() < 1e-7
+
+
+def test_a_delta_robot_reaches_wherever_its_arms_do():
+    """Each arm and its rods are two bars in a plane; above the base too, where the plate could begin to turn."""
+    r = np.random.default_rng(4).uniform([-1.1, -1.1, -1.2], [1.1, 1.1, 1.2], (20 * PLACES, 3))
+    phi = delta_angles(r, 1)
+    r, phi = (a[np.isfinite(phi).all(axis=1)][:PLACES] for a in (r, phi))
+    k = Kinematics(DeltaRobot())
+    assert len(r) == PLACES
+    assert np.abs(turned(k.ik(r) - phi)).max() < 1e-8

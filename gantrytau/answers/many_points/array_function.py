@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from gantrytau.answers.causality import composed, function
@@ -69,7 +70,9 @@ class _Arrays:
     @cached_property
     def grown(self) -> GrownBranch:
         """The branch as far as it goes."""
-        return GrownBranch(self.second)
+        grown = GrownBranch(self.second.start, self.second.count, self.second.tears_beside)
+        grown.grow()
+        return grown
 
     @cached_property
     def first(self) -> ThroughBlocks:
@@ -118,6 +121,14 @@ class ArrayFunction:
         q = self._checked(arguments)
         found = self._everywhere(q, self._slopes_of_some)
         return self._completed(q, found, lambda arrays, rows: [arrays.slopes_around(rows)])[0]
+
+    @property
+    def closed_form(self) -> ca.Function | None:
+        """All results below each other by all arguments, where no unknowns are followed along branches."""
+        try:
+            return self._arrays.second.closed_form
+        except NotForArrays:
+            return None
 
     def _completed(
         self,

@@ -3,7 +3,8 @@
 What they are is seen at points of the branch. The rest is determined by some of the equations, often in parts that do
 not know of each other, and is followed by itself: that takes a tenth of the time. As equations are analytic, what keeps its
 value on a piece of the branch does so on all of it. Still all equations are asked in the end, and where another Jacobian of
-the whole block was singular on the way, or may have been, the whole block is followed.
+the whole block was singular on the way, or may have been, the whole block is followed. Ways around lead past such poses, as
+those in which a plate on parallelograms could begin to turn, and keep what is kept.
 """
 
 from collections.abc import Sequence
@@ -36,22 +37,29 @@ class ReducedBranch:
 
     def __call__(self, end: np.ndarray) -> np.ndarray:
         """Y (n, N) at `end` (k, N); NaN where the branch does not lead there."""
-        y = np.repeat(self.kept[:, None], end.shape[1], axis=1)
-        for part, places in zip(self.parts, self.places, strict=True):
-            y[list(places)] = part(end)
-        found = np.isfinite(y).all(axis=0)
-        y[:, ~found] = np.nan  # where a part ends, so does the whole
-        error, pivots = self._judged(y[:, found], end[:, found])
+        y, holds, pivots = self._completed([part(end) for part in self.parts], end)
         with np.errstate(invalid="ignore"):
-            sure = (error[0] <= SOLVED) & (pivots > LIKE).all(axis=0) & (pivots < 1 / LIKE).all(axis=0)
-        doubtful = np.flatnonzero(found)[~sure]
+            sure = holds & (pivots > LIKE).all(axis=0) & (pivots < 1 / LIKE).all(axis=0)
+        doubtful = np.flatnonzero(np.isfinite(y[0]) & ~sure)
         if doubtful.size:
             y[:, doubtful] = self.whole(end[:, doubtful])
         return y
 
     def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
         """See `FollowedBranch.beside`."""
-        return self.whole.beside(end, begin, start)
+        led = zip(self.parts, self.places, strict=True)
+        y, holds, _ = self._completed([part.beside(end, begin, start[list(own)]) for part, own in led], end)
+        y[:, ~holds] = np.nan
+        return y
+
+    def _completed(self, found: Sequence[np.ndarray], end: np.ndarray) -> tuple[np.ndarray, ...]:
+        """All unknowns from those of the parts, NaN where one ends; whether equations hold, and pivots as `_judged`."""
+        y = np.repeat(self.kept[:, None], end.shape[1], axis=1)
+        for part, places in zip(found, self.places, strict=True):
+            y[list(places)] = part
+        y[:, ~np.isfinite(y).all(axis=0)] = np.nan
+        error, pivots = self._judged(y, end)
+        return y, error[0] <= SOLVED, pivots
 
     @cached_property
     def _judged(self) -> ArrayProgram:

@@ -84,6 +84,7 @@ class ThroughBlocks:
         everything = [q, tears]
         whole = [ca.densify(ca.vec(t)) for t in targets]
         holds = [reduce(ca.logic_and, trusted)] if trusted else [ca.SX(1)]
+        self.closed_form = None if blocks.implicit else ca.Function("whole", [q], [ca.vertcat(*whole)])
         self._rest = ArrayProgram(ca.Function("rest", everything, [*whole, *holds], {"cse": True}))
         self._slopes = lambda: _slopes(everything, residuals, ca.vertcat(*whole))
 
