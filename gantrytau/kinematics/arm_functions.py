@@ -8,6 +8,7 @@ missed is out of reach.
 """
 
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
 from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.errors import ModelError
-from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, limits_of, twists
+from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, independent, limits_of, twists
 
 NEIGHBOURS = (
     12  # places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
@@ -36,7 +37,7 @@ class ArmFunctions(ModelFunctions):
         """Whether it is one: more joints than a position determines, which determine the pose in closed form."""
         return len(self.joints) > 3 and len(self._wanted) > 1 and self._forward.closed_form is not None
 
-    def ik(self, r, R=None, sides=None):
+    def ik(self, r, R: Any = None, sides=None):
         """Joints q, and iterations."""
         self.check(R)
         pose = np.column_stack([r, np.swapaxes(R, 1, 2).reshape(-1, 9)]).T
@@ -52,24 +53,62 @@ class ArmFunctions(ModelFunctions):
         """r, R and iterations: joints in a row have one pose."""
         return *self._posed(self._forward(*q.T)), np.zeros(len(q), dtype=int)
 
-    def jacobian(self, r, R=None):
+    def jacobian(self, r, R: Any = None):
         """dq/dpose (N, n, 6); zero along what the joints do not decide."""
         rates = self.rates(r, R)
         found, known = np.swapaxes(np.full_like(rates, np.nan), 1, 2), np.isfinite(rates).all(axis=(1, 2))
         found[known] = np.linalg.pinv(rates[known])
         return found
 
-    def rates(self, r, R=None):
+    def rates(self, r, R: Any = None):
         """Velocity and angular velocity of the tool by rates of the joints, (N, 6, n)."""
         return twists(self._forward.slopes(*self.ik(r, R)[0].T), R)
 
-    def whole_pose(self, r, R=None):
+    def whole_pose(self, r, R: Any = None):
         """The pose."""
         return r, R
 
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each."""
         return self.dae.array_function(self.joints, names)(*self.ik(r, R)[0].T)
+
+    def solutions(self, r, R: Any = None):
+        """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
+        self.check(R)
+        pose = np.concatenate([r[0], R[0].T.ravel()])
+        q, _ = self._branch.solutions(pose)
+        q = q[:, self._meets(pose[:, None], q)]
+        return q.T, self._signs(q.T) * self._signs(self.home.q[None])
+
+    def _signs(self, q: np.ndarray) -> np.ndarray:
+        """Of factors of the Jacobian's determinant, (s, N): one for each joint at whose values it vanishes, and the rest."""
+        signs = np.ones((len(self._roots) + 1, len(q)))
+        for row, (joint, roots) in zip(signs, self._roots.items(), strict=False):
+            angle = (q[:, joint] + np.pi) % (2 * np.pi) - np.pi
+            row[(angle[:, None] > roots).sum(axis=1) % 2 > 0] = -1.0
+        signs[-1] = np.sign(self._minors(q)) * signs.prod(axis=0)
+        return signs
+
+    def _minors(self, q: np.ndarray) -> np.ndarray:
+        """Determinants of the rows of the Jacobian that are independent at the start, (N,)."""
+        rows = independent(self._home_rates)
+        return np.linalg.det(twists(self._forward.slopes(*q.T), self.fk(q)[1])[:, rows])
+
+    @cached_property
+    def _roots(self) -> dict[int, np.ndarray]:
+        """Angles at which the Jacobian is singular wherever other joints stand, by the place of the joint."""
+        others = np.random.default_rng(0).uniform(-np.pi, np.pi, (6, 1, len(self.joints)))
+        angles = np.linspace(-np.pi, np.pi, 361) + 1e-3
+        found = {}
+        for joint in self._turns:
+            q = np.repeat(others, len(angles), axis=1)
+            q[:, :, joint] = angles
+            minor = self._minors(q.reshape(-1, q.shape[2])).reshape(len(q), -1)
+            turned = np.flatnonzero((minor[:, 1:] * minor[:, :-1] < 0).all(axis=0))
+            if turned.size:
+                before, after = minor[0, turned], minor[0, turned + 1]
+                found[joint] = angles[turned] + (angles[1] - angles[0]) * before / (before - after)
+        return found
 
     def _meets(self, pose: np.ndarray, q: np.ndarray) -> np.ndarray:
         """Where joints q (n, N) bring the tool into its pose (12, N), (N,)."""
@@ -93,7 +132,7 @@ class ArmFunctions(ModelFunctions):
         q, pose = ca.SX.sym("q", count), ca.SX.sym("pose", 12)
         r, R = ca.vertsplit(self._forward.closed_form(q), [0, 3, 12])
         turn = ca.reshape(R, 3, 3) @ ca.reshape(pose[3:], 3, 3).T
-        e = ca.vertcat(r - pose[:3], ca.inv_skew(turn - turn.T) / 2)
+        e = ca.vertcat(r - pose[:3], ca.inv_skew(turn - turn.T) / (1 + ca.trace(turn)))
         f = e if count == 6 else ca.jacobian(e, q).T @ e
         begin = np.concatenate([self.home.r, self.home.R.T.ravel()])
         return FollowedBranch(ca.Function("arm", [q, pose], [f], {"cse": True}), self.home.q, begin)

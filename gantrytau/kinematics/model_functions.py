@@ -43,14 +43,25 @@ class ModelFunctions:
         """Joints q and iterations (none are counted: they run inside the functions)."""
         x = self._coordinates(r, R)
         q = self._joints_of(x)
-        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
-            there, turned = self._pose_of(np.where(np.isfinite(q), x, np.nan))
-            with np.errstate(invalid="ignore"):
-                missed = np.abs(there - r).max(axis=1)
-                if R is not None:
-                    missed = np.maximum(missed, np.abs(turned - R).max(axis=(1, 2)))
-                q[~(missed <= self.tolerance)] = np.nan
+        q[~self._has_rest(np.where(np.isfinite(q), x, np.nan), r, R)] = np.nan
         return q, np.zeros(len(r), dtype=int)
+
+    def _has_rest(self, x: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """Where the rest of a pose is what its coordinates x make it, (N,)."""
+        if self.places in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
+            return np.full(len(r), True)
+        there, turned = self._pose_of(x)
+        with np.errstate(invalid="ignore"):
+            missed = np.abs(there - r).max(axis=1)
+            if R is not None:
+                missed = np.maximum(missed, np.abs(turned - R).max(axis=(1, 2)))
+            return missed <= self.tolerance
+
+    def solutions(self, r, R=None) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
+        x = self._coordinates(r, R)
+        q, signs = self._inverse.solutions(x[0])
+        return q[: len(q) if self._has_rest(x, r, R)[0] else 0], signs
 
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) where Newton on the inverse starts, else the branch of the start values."""
@@ -138,7 +149,7 @@ class ModelFunctions:
                 return (0, 1, 2)
             except StructureError:
                 pass  # the position has other than three degrees of freedom
-        chosen = _independent(self._moves)
+        chosen = independent(self._moves)
         if len(chosen) < count:
             raise ModelError(
                 f"Kinematics: found {count} joints of {self.dae.name}, which move {self.tool} in {len(chosen)} ways, "
@@ -270,7 +281,7 @@ def whole(found: np.ndarray) -> np.ndarray:
     return found
 
 
-def _independent(moves: np.ndarray) -> list[int]:
+def independent(moves: np.ndarray) -> list[int]:
     """Rows of the position, then of the orientation, that are independent, those that move most first; in order."""
     chosen: list[int] = []
     left = np.array(moves)
@@ -289,7 +300,10 @@ def _independent(moves: np.ndarray) -> list[int]:
 
 def twists(slopes: np.ndarray, R: np.ndarray) -> np.ndarray:
     """Velocity and angular velocity in the world, (N, 6, n), of slopes (N, 12, n) of r and R, column after column."""
-    turns = slopes[:, 3:].reshape(len(R), 3, 3, -1).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
+    turns = (
+        slopes[:, 3:].reshape(len(R), 3, 3, slopes.shape[2]).transpose(0, 3, 2, 1)
+        @ np.swapaxes(R, 1, 2)[:, None]
+    )
     return np.concatenate([slopes[:, :3], np.stack([turns[:, :, i, j] for i, j in SPIN], axis=1)], axis=1)
 
 

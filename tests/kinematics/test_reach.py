@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from gantrytau import Model, Start, connect
+from gantrytau import Model, ModelError, Start, connect
 from gantrytau.kinematics import Kinematics
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
 from gantrytau_models import DeltaRobot, FiveBar
@@ -15,6 +15,7 @@ from tests.references.delta import ACROSS, OUT
 
 PLACES = 10_000 if NIGHTLY else 400
 UPPER, FORE = 0.4, 0.3
+JOINTS_OF = {"two bars": ["shoulder.phi", "elbow.phi"], "SCARA": ["shoulder.phi", "elbow.phi", "spindle.s"]}
 NEAR = 1e-3  # m beside the border of the workspace, where the branch turns back
 
 
@@ -144,3 +145,47 @@ def test_a_delta_robot_reaches_wherever_its_arms_do():
     k = Kinematics(DeltaRobot())
     assert len(r) == PLACES
     assert np.abs(turned(k.ik(r) - phi)).max() < 1e-8
+
+
+@pytest.mark.parametrize("robot", ["two bars", "SCARA", "five bars", "delta"])
+def test_all_configurations_of_a_place(robot):
+    r = np.array([0.1, 0.45, -0.6 if robot == "delta" else 0.0])
+    sides = (1, -1)
+    if robot == "delta":
+        k = Kinematics(DeltaRobot())
+        want = itertools.product(*np.array([delta_angles(r[None], side)[0] for side in sides]).T)
+    elif robot == "five bars":
+        k = Kinematics(FiveBar())
+        arms = [[two_bars(r[None] - [x, 0, 0], s, 0.3, 0.4)[0, 0] for s in sides] for x in (-0.1, 0.1)]
+        want = itertools.product(*arms)
+    else:
+        k = Kinematics(Scara() if robot == "SCARA" else TwoBars(), joints=JOINTS_OF[robot])
+        want = [np.append(two_bars(r[None], side)[0], r[2:])[: len(k.joints)] for side in sides]
+    found = k.configurations(r=r)
+    want = np.array(list(want))
+    gaps = np.abs(turned(np.array([c.q for c in found])[:, None] - want)).max(axis=2)
+    assert np.sort(gaps.min(axis=0)) == pytest.approx(0, abs=1e-8)
+    assert len(found) == len(want) == len({c.name for c in found})
+    assert set(found[0].name) == {"+"}
+    assert found[0].q == pytest.approx(k.ik(r), abs=1e-9)
+
+
+def test_eight_configurations_of_an_arm_of_six_joints():
+    """The first three joints from the place of the wrist, the others by a wrist that turns over."""
+    limits = dict(phi=dict(min=0.0, max=np.pi))
+    arm = Kinematics(SixJoints(elbow=limits | dict(phi=limits["phi"] | dict(start=0.8))), joints=JOINTS)
+    q = np.array([0.9, -0.4, 1.1, 2.0, -0.7, -2.0])
+    r, R = arm.fk(q)
+    found = arm.configurations(r=r, R=R)
+    assert len({c.name for c in found}) == len(found) == 8
+    there, turns = arm.fk(np.array([c.q for c in found]))
+    assert np.abs(there - r).max() < 1e-9
+    assert np.abs(turns - R).max() < 1e-9
+    size, height = np.hypot(*r[:2]), r[2] - 0.4
+    elbow = np.arccos((size**2 + height**2 - 0.61) / 0.6)
+    assert np.abs([c.q[2] for c in found]) == pytest.approx(np.full(8, elbow), abs=1e-9)
+    assert all((c.q[2] > 0) == (c.name[0] == "+") == c.feasible for c in found)
+    assert all((c.q[4] > 0) == (c.name[1] == "+") for c in found)
+    assert arm.configurations(r=[9.0, 0.0, 0.0], R=R) == []
+    with pytest.raises(ModelError, match="found 2 positions, expected one pose"):
+        arm.configurations(r=[r, r], R=R)

@@ -7,6 +7,7 @@ the whole block was singular on the way, or may have been, the whole block is fo
 those in which a plate on parallelograms could begin to turn, and keep what is kept.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -51,6 +52,16 @@ class ReducedBranch:
         y, holds, _ = self._completed([part.beside(end, begin, start[list(own)]) for part, own in led], end)
         y[:, ~holds] = np.nan
         return y
+
+    def solutions(self, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `FollowedBranch.solutions`; a row of signs for each part."""
+        of_parts = [part.solutions(end) for part in self.parts]
+        chosen = list(itertools.product(*(range(y.shape[1]) for y, _ in of_parts)))
+        take = [[way[k] for way in chosen] for k in range(len(self.parts))]
+        parts = [y[:, own] for (y, _), own in zip(of_parts, take, strict=True)]
+        y, holds, _ = self._completed(parts, np.repeat(end[:, None], len(chosen), axis=1))
+        signs = np.vstack([sign[:, own] for (_, sign), own in zip(of_parts, take, strict=True)])
+        return y[:, holds], signs[:, holds]
 
     def _completed(self, found: Sequence[np.ndarray], end: np.ndarray) -> tuple[np.ndarray, ...]:
         """All unknowns from those of the parts, NaN where one ends; whether equations hold, and pivots as `_judged`."""
