@@ -19,7 +19,7 @@ import numpy as np
 from gantrytau.answers.implicit_blocks import SOLVED
 from gantrytau.answers.many_points.array_program import ArrayProgram
 from gantrytau.answers.many_points.elimination import pivots_in_order
-from gantrytau.answers.many_points.followed_branches import FollowedBranch
+from gantrytau.answers.many_points.followed_branches import SETTLED, FollowedBranch
 
 KEEPS = 1e-11  # of one and its size, by which a value may differ from point to point
 FEWEST = 8  # points on the branch from which it is told
@@ -43,7 +43,11 @@ class ReducedBranch:
             sure = holds & (pivots > LIKE).all(axis=0) & (pivots < 1 / LIKE).all(axis=0)
         doubtful = np.flatnonzero(np.isfinite(y[0]) & ~sure)
         if doubtful.size:
-            y[:, doubtful] = self.whole(end[:, doubtful])
+            other = self.whole(end[:, doubtful])
+            gaps = np.nan_to_num(
+                other - self.kept[:, None]
+            )  # beside what is kept, other branches have split off
+            y[:, doubtful] = np.where(np.abs(gaps).max(axis=0) <= SETTLED, other, np.nan)
         return y
 
     def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
