@@ -64,10 +64,6 @@ class ArmFunctions(ModelFunctions):
         """Velocity and angular velocity of the tool by rates of the joints, (N, 6, n)."""
         return twists(self._forward.slopes(*self.ik(r, R)[0].T), R)
 
-    def whole_pose(self, r, R: Any = None):
-        """The pose."""
-        return r, R
-
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each."""
         return self.dae.array_function(self.joints, names)(*self.ik(r, R)[0].T)

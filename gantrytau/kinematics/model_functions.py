@@ -61,7 +61,8 @@ class ModelFunctions:
         """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
         x = self._coordinates(r, R)
         q, signs = self._inverse.solutions(x[0])
-        return q[: len(q) if self._has_rest(x, r, R)[0] else 0], signs
+        here = np.full(len(q), self._has_rest(x, r, R)[0])
+        return q[here], signs[:, here]
 
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) where Newton on the inverse starts, else the branch of the start values."""
