@@ -169,7 +169,7 @@ def test_all_configurations_of_a_place(robot):
     assert set(found[0].name) == {"+"}
     assert found[0].q == pytest.approx(k.ik(r), abs=1e-9)
     assert k.configurations(r=[9.0, 9.0, 0.0]) == k.configurations(r=[np.nan] * 3) == []
-    assert robot != "five bars" or k.configurations(r=r + [0, 0, 0.1]) == []  # beside their plane
+    assert robot != "five bars" or k.configurations(r=[*r[:2], 0.1]) == []  # beside their plane
 
 
 def test_eight_configurations_of_an_arm_of_six_joints():
