@@ -18,9 +18,10 @@ from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.kinematics.arm_functions import ArmFunctions
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of, limits_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
-from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose
+from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose, of_signs
 from gantrytau.kinematics.rods.rod_geometry import geometry_of
 from gantrytau.kinematics.rods.rod_robots import Home, RodRobot, SixRods, TurningRods, robot_on
 from gantrytau.kinematics.rotations import angle_between
@@ -191,14 +192,19 @@ class Kinematics(Record):
         """All solutions, forward of q or inverse of r (and R), each with `.q .r .R .feasible`.
 
         Three links: two poses of q, eight q of a pose, for many at once. Six links: one pose at a time; all real
-        assembly modes of q, or the q of a pose with every arm on either side of its cart. Raises ModelError unless
-        exactly one of q and r is given.
+        assembly modes of q, or the q of a pose with every arm on either side of its cart. Any other robot: the q of one pose
+        from many starts, with names such as "+-": a sign for each loop, of an arm in a row for each joint at whose values it
+        is singular and for the rest, "+" as at home. Raises ModelError unless exactly one of q and r is given.
         """
         if (q is None) == (r is None):
             raise ModelError(
                 f"Kinematics.configurations: found {'neither' if q is None else 'both'} of q and r, expected one of them; "
                 "give q= for poses, r= (and R=) for actuator coordinates"
             )
+        if isinstance(self._solver, ModelFunctions) and q is None:
+            at = poses(r, R, "Kinematics.configurations")
+            joints, signs = self._solver.solutions(at.r[:1], None if at.R is None else at.R[:1])
+            return of_signs(at, self.within_a_turn(joints, self.limits), signs, self.limits)
         robot = self.linked("configurations")
         if q is not None:
             joints, one = vectors(q, len(self.joints), "q", "Kinematics.configurations")
@@ -318,9 +324,15 @@ class Kinematics(Record):
     def _by_equations(self, joints: Sequence[str] | None) -> ModelFunctions:
         names = tuple(joints) if joints is not None else driven_joints(self.dae)
         names = tuple(scalar for name in names for scalar in self.dae.expand(name))
-        return ModelFunctions(
-            self.dae, self._tool, names, home_of(self.dae.evaluate(), self._tool, names), self._tolerance
+        robot = (
+            self.dae,
+            self._tool,
+            names,
+            home_of(self.dae.evaluate(), self._tool, names),
+            self._tolerance,
         )
+        arm = ArmFunctions(*robot)
+        return arm if arm.in_a_row else ModelFunctions(*robot)
 
 
 def _length(tolerance: float) -> float:

@@ -43,14 +43,26 @@ class ModelFunctions:
         """Joints q and iterations (none are counted: they run inside the functions)."""
         x = self._coordinates(r, R)
         q = self._joints_of(x)
-        if self.places not in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
-            there, turned = self._pose_of(np.where(np.isfinite(q), x, np.nan))
-            with np.errstate(invalid="ignore"):
-                missed = np.abs(there - r).max(axis=1)
-                if R is not None:
-                    missed = np.maximum(missed, np.abs(turned - R).max(axis=(1, 2)))
-                q[~(missed <= self.tolerance)] = np.nan
+        q[~self._has_rest(np.where(np.isfinite(q), x, np.nan), r, R)] = np.nan
         return q, np.zeros(len(r), dtype=int)
+
+    def _has_rest(self, x: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """Where the rest of a pose is what its coordinates x make it, (N,)."""
+        if self.places in ((0, 1, 2), (0, 1, 2, 3, 4, 5)):
+            return np.full(len(r), True)
+        there, turned = self._pose_of(x)
+        with np.errstate(invalid="ignore"):
+            missed = np.abs(there - r).max(axis=1)
+            if R is not None:
+                missed = np.maximum(missed, np.abs(turned - R).max(axis=(1, 2)))
+            return missed <= self.tolerance
+
+    def solutions(self, r, R=None) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
+        x = self._coordinates(r, R)
+        q, signs = self._inverse.solutions(x[0])
+        here = np.full(len(q), self._has_rest(x, r, R)[0])
+        return q[here], signs[:, here]
 
     def fk(self, q, near=None):
         """r, R and iterations; near: (r, R) where Newton on the inverse starts, else the branch of the start values."""
@@ -85,11 +97,7 @@ class ModelFunctions:
             turns = np.zeros((len(x), 6, 6))
             turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
             return solved(turns, by_joints)
-        spins = (
-            moves[:, 3:].reshape(len(x), 3, 3, count).transpose(0, 3, 2, 1) @ np.swapaxes(R, 1, 2)[:, None]
-        )
-        spins = np.stack([spins[:, :, i, j] for i, j in SPIN], axis=1)
-        return self._in_reach(np.concatenate([moves[:, :3], spins], axis=1) @ by_joints, r, R)
+        return self._in_reach(twists(moves, R) @ by_joints, r, R)
 
     def whole_pose(self, r, R=None):
         """The pose with the orientation that follows where none is given."""
@@ -131,9 +139,8 @@ class ModelFunctions:
         count = len(self.joints)
         if count > 3 and f"{self.tool}.q" not in self.dae.vectors:
             raise ModelError(
-                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, as the orientation "
-                "follows from joints in a row, expected a tool with coordinates of its own to be given a pose: "
-                f"{self.tool} = Body(..., free=True), or {self.tool}=dict(free=True) where it is made"
+                f"Kinematics: found {count} joints of {self.dae.name} and no quaternion {self.tool}.q, expected a tool with "
+                f"an orientation: a Body behind joints in a row, on a loop {self.tool} = Body(..., free=True)"
             )
         if count == 6:
             return (0, 1, 2, 3, 4, 5)
@@ -143,7 +150,7 @@ class ModelFunctions:
                 return (0, 1, 2)
             except StructureError:
                 pass  # the position has other than three degrees of freedom
-        chosen = _independent(self._moves)
+        chosen = independent(self._moves)
         if len(chosen) < count:
             raise ModelError(
                 f"Kinematics: found {count} joints of {self.dae.name}, which move {self.tool} in {len(chosen)} ways, "
@@ -157,9 +164,8 @@ class ModelFunctions:
         slopes = self._forward.slopes(*self.home.q[:, None])[0]
         if f"{self.tool}.q" not in self.dae.vectors:
             return slopes[:3]
-        rates = slopes[3:].reshape(3, 3, -1).transpose(2, 1, 0) @ self.home.R.T  # dR R.T, skew
-        spins = np.stack([rates[:, i, j] for i, j in SPIN])
-        return np.vstack([slopes[:3], _turns_of_quaternions(self.home.R[None])[0] @ spins])
+        moves = twists(slopes[None], self.home.R[None])[0]
+        return np.vstack([moves[:3], _turns_of_quaternions(self.home.R[None])[0] @ moves[3:]])
 
     def _forward_from(self, x: np.ndarray, q: np.ndarray):
         """Poses of which the inverse is q, from coordinates x (N, n) near them; NaN where Newton does not end."""
@@ -187,7 +193,7 @@ class ModelFunctions:
         return self._posed(self._following.around(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
-        found = _whole(np.hstack(self._inverse.around(*self._arguments(x))))
+        found = whole(np.hstack(self._inverse.around(*self._arguments(x))))
         return self.within_a_turn(found, limits_of(self.dae, self.joints))
 
     def within_a_turn(self, q: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -199,7 +205,7 @@ class ModelFunctions:
 
     def _slopes_of(self, x: np.ndarray) -> np.ndarray:
         """Slopes of the joints by the coordinates of poses, (N, n, n)."""
-        return _whole(self._inverse.slopes_around(*self._arguments(x)))
+        return whole(self._inverse.slopes_around(*self._arguments(x)))
 
     @cached_property
     def _forward(self) -> ArrayFunction:
@@ -233,7 +239,7 @@ class ModelFunctions:
 
     def _posed(self, found: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Positions and orientations; a tool without orientation keeps that of the world."""
-        both = _whole(np.hstack(found))
+        both = whole(np.hstack(found))
         r = both[:, :3]
         if len(found) > 1:
             return r, both[:, 3:].reshape(-1, 3, 3).transpose(0, 2, 1)
@@ -243,6 +249,13 @@ class ModelFunctions:
 
     def _coordinates(self, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
         """Coordinates (N, n) of poses."""
+        self.check(R)
+        if R is None:
+            return r[:, list(self.places)]
+        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
+
+    def check(self, R: np.ndarray | None) -> None:
+        """ModelError where an orientation is missing or one too many."""
         if (R is not None) != self.turning:
             count = len(self.joints)
             raise ModelError(
@@ -250,9 +263,6 @@ class ModelFunctions:
                 f"expected {'one, as joints turn the tool' if R is None else 'none, as it follows from the position'}; "
                 "name others by joints="
             )
-        if R is None:
-            return r[:, list(self.places)]
-        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
 
 
 def limits_of(dae: Dae, joints: Sequence[str]) -> np.ndarray:
@@ -266,13 +276,13 @@ def limits_of(dae: Dae, joints: Sequence[str]) -> np.ndarray:
     return found
 
 
-def _whole(found: np.ndarray) -> np.ndarray:
+def whole(found: np.ndarray) -> np.ndarray:
     """The same with poses NaN of which some numbers are, as where one arm of two is too short."""
     found[~np.isfinite(found).all(axis=tuple(range(1, found.ndim)))] = np.nan
     return found
 
 
-def _independent(moves: np.ndarray) -> list[int]:
+def independent(moves: np.ndarray) -> list[int]:
     """Rows of the position, then of the orientation, that are independent, those that move most first; in order."""
     chosen: list[int] = []
     left = np.array(moves)
@@ -287,6 +297,15 @@ def _independent(moves: np.ndarray) -> list[int]:
             along = left[best] / sizes[best]
             left = left - np.outer(left @ along, along)
     return sorted(chosen)
+
+
+def twists(slopes: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Velocity and angular velocity in the world, (N, 6, n), of slopes (N, 12, n) of r and R, column after column."""
+    turns = (
+        slopes[:, 3:].reshape(len(R), 3, 3, slopes.shape[2]).transpose(0, 3, 2, 1)
+        @ np.swapaxes(R, 1, 2)[:, None]
+    )
+    return np.concatenate([slopes[:, :3], np.stack([turns[:, :, i, j] for i, j in SPIN], axis=1)], axis=1)
 
 
 def _turns_of_quaternions(R: np.ndarray) -> np.ndarray:

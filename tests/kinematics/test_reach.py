@@ -5,16 +5,17 @@ import itertools
 import numpy as np
 import pytest
 
-from gantrytau import Model, Start, connect
+from gantrytau import Model, ModelError, Start, connect
 from gantrytau.kinematics import Kinematics
-from gantrytau.kinematics.rotations import quaternions
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
-from gantrytau_models import FiveBar
+from gantrytau_models import DeltaRobot, FiveBar
 from tests.families import NIGHTLY, first_of
 from tests.kinematics.test_serial_arms import JOINTS, SixJoints
+from tests.references.delta import ACROSS, OUT
 
 PLACES = 10_000 if NIGHTLY else 400
 UPPER, FORE = 0.4, 0.3
+JOINTS_OF = {"two bars": ["shoulder.phi", "elbow.phi"], "SCARA": ["shoulder.phi", "elbow.phi", "spindle.s"]}
 NEAR = 1e-3  # m beside the border of the workspace, where the branch turns back
 
 
@@ -55,6 +56,14 @@ def two_bars(r, side, a=UPPER, b=FORE):
     elbow = side * np.arccos(cosine)
     shoulder = np.arctan2(r[:, 1], r[:, 0]) - np.arctan2(b * np.sin(elbow), a + b * np.cos(elbow))
     return np.column_stack([shoulder, elbow])
+
+
+def delta_angles(r, side, base=0.2 - 0.06, arm=0.3, rod=0.8):
+    """Angles of the arms of a delta robot below the level, elbows outside or inside, (N, 3); NaN up to its border."""
+    x, y, z = r @ OUT.T - base, r @ ACROSS.T, r[:, 2:]
+    cosine = (x**2 + z**2 + y**2 + arm**2 - rod**2) / (2 * arm * np.hypot(x, z))
+    cosine[np.abs(cosine) > 1 - 1e-4] = np.nan
+    return np.arctan2(-z, x) - side * np.arccos(cosine)
 
 
 def ring(inner, outer, seed=0):
@@ -117,23 +126,68 @@ def test_five_bars_reach_wherever_both_cranks_do(left, right):
     assert np.isnan(k.ik(np.array([[0.5, 0.5, 0.0], [-0.1, 0.05, 0.0]]))).all()
 
 
-@pytest.mark.nightly  # ten seconds to grow its branch in six coordinates
+@pytest.mark.nightly  # some seconds to grow its branch in six coordinates
 def test_an_arm_of_six_joints_reaches_all_of_its_aspect():
-    """Places of joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight."""
-    arm = Kinematics(SixJoints(tool=dict(free=True)), joints=JOINTS)
-    random = np.random.default_rng(2)
-    q = np.column_stack([
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(0.05, np.pi - 0.05, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-        random.uniform(0.05, np.pi - 0.05, 8 * PLACES),
-        random.uniform(-np.pi, np.pi, 8 * PLACES),
-    ])  # fmt: skip
-    ahead = 0.6 * np.cos(q[:, 1]) + 0.5 * np.cos(q[:, 1] + q[:, 2])
-    q = q[ahead > 0.05][:PLACES]
+    """Random joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight."""
+    arm = Kinematics(SixJoints(), joints=JOINTS)
+    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (8 * PLACES, 6))
+    q[:, [2, 4]] = np.abs(q[:, [2, 4]])
+    q = q[0.6 * np.cos(q[:, 1]) + 0.5 * np.cos(q[:, 1] + q[:, 2]) > 0][:PLACES]
     r, R = arm.fk(q)
-    found = arm.ik(r, R)
-    half = quaternions(R)[:, 0] < 1e-2  # nearly half a turn from the axes of the world
-    assert not np.isnan(found[~half]).any()
-    assert np.abs(turned(found - q)[~half]).max() < 1e-7
+    assert np.abs(turned(arm.ik(r, R) - q)).max() < 1e-7
+
+
+def test_a_delta_robot_reaches_wherever_its_arms_do():
+    """Each arm and its rods are two bars in a plane; above the base too, where the plate could begin to turn."""
+    r = np.random.default_rng(4).uniform([-1.1, -1.1, -1.2], [1.1, 1.1, 1.2], (20 * PLACES, 3))
+    phi = delta_angles(r, 1)
+    r, phi = (a[np.isfinite(phi).all(axis=1)][:PLACES] for a in (r, phi))
+    k = Kinematics(DeltaRobot())
+    assert len(r) == PLACES
+    assert np.abs(turned(k.ik(r) - phi)).max() < 1e-8
+
+
+@pytest.mark.parametrize("robot", ["two bars", "SCARA", "five bars", "delta"])
+def test_all_configurations_of_a_place(robot):
+    r = np.array([0.1, 0.45, -0.6 if robot == "delta" else 0.0])
+    sides = (1, -1)
+    if robot == "delta":
+        k = Kinematics(DeltaRobot())
+        want = itertools.product(*np.array([delta_angles(r[None], side)[0] for side in sides]).T)
+    elif robot == "five bars":
+        k = Kinematics(FiveBar())
+        arms = [[two_bars(r[None] - [x, 0, 0], s, 0.3, 0.4)[0, 0] for s in sides] for x in (-0.1, 0.1)]
+        want = itertools.product(*arms)
+    else:
+        k = Kinematics(Scara() if robot == "SCARA" else TwoBars(), joints=JOINTS_OF[robot])
+        want = [np.append(two_bars(r[None], side)[0], r[2:])[: len(k.joints)] for side in sides]
+    found = k.configurations(r=r)
+    want = np.array(list(want))
+    gaps = np.abs(turned(np.array([c.q for c in found])[:, None] - want)).max(axis=2)
+    assert np.sort(gaps.min(axis=0)) == pytest.approx(0, abs=1e-8)
+    assert len(found) == len(want) == len({c.name for c in found})
+    assert set(found[0].name) == {"+"}
+    assert found[0].q == pytest.approx(k.ik(r), abs=1e-9)
+    assert k.configurations(r=[9.0, 9.0, 0.0]) == k.configurations(r=[np.nan] * 3) == []
+    assert robot != "five bars" or k.configurations(r=[*r[:2], 0.1]) == []  # beside their plane
+
+
+def test_eight_configurations_of_an_arm_of_six_joints():
+    """The first three joints from the place of the wrist, the others by a wrist that turns over."""
+    limits = dict(phi=dict(min=0.0, max=np.pi))
+    arm = Kinematics(SixJoints(elbow=limits | dict(phi=limits["phi"] | dict(start=0.8))), joints=JOINTS)
+    q = np.array([0.9, -0.4, 1.1, 2.0, -0.7, -2.0])
+    r, R = arm.fk(q)
+    found = arm.configurations(r=r, R=R)
+    assert len({c.name for c in found}) == len(found) == 8
+    there, turns = arm.fk(np.array([c.q for c in found]))
+    assert np.abs(there - r).max() < 1e-9
+    assert np.abs(turns - R).max() < 1e-9
+    size, height = np.hypot(*r[:2]), r[2] - 0.4
+    elbow = np.arccos((size**2 + height**2 - 0.61) / 0.6)
+    assert np.abs([c.q[2] for c in found]) == pytest.approx(np.full(8, elbow), abs=1e-9)
+    assert all((c.q[2] > 0) == (c.name[0] == "+") == c.feasible for c in found)
+    assert all((c.q[4] > 0) == (c.name[1] == "+") for c in found)
+    assert arm.configurations(r=[9.0, 0.0, 0.0], R=R) == []
+    with pytest.raises(ModelError, match="found 2 positions, expected one pose"):
+        arm.configurations(r=[r, r], R=R)

@@ -9,10 +9,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from gantrytau.answers.causality import composed, function
-from gantrytau.answers.function_through import Question
+from gantrytau.answers.function_through import Question, parted
 from gantrytau.answers.many_points.array_program import NotForArrays
 from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.answers.many_points.point_by_point import PointByPoint
@@ -69,7 +70,9 @@ class _Arrays:
     @cached_property
     def grown(self) -> GrownBranch:
         """The branch as far as it goes."""
-        return GrownBranch(self.second)
+        grown = GrownBranch(self.second.start, self.second.count, self.second.tears_beside)
+        grown.grow()
+        return grown
 
     @cached_property
     def first(self) -> ThroughBlocks:
@@ -118,6 +121,17 @@ class ArrayFunction:
         q = self._checked(arguments)
         found = self._everywhere(q, self._slopes_of_some)
         return self._completed(q, found, lambda arrays, rows: [arrays.slopes_around(rows)])[0]
+
+    def solutions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Results (m, n) of all branches at arguments (k,) and signs that tell them apart, (s, m)."""
+        tears, signs = self._arrays.second.solutions(q)
+        found, _ = self._arrays.second.targets(np.repeat(q[:, None], tears.shape[1], axis=1), tears)
+        return np.vstack(found).T, signs
+
+    @cached_property
+    def closed_form(self) -> ca.Function | None:
+        """All results below each other by all arguments, where no unknowns are followed along branches."""
+        return composed(self._dae, self.given, self.find, _in_closed_form, lambda _: None)
 
     def _completed(
         self,
@@ -194,6 +208,14 @@ class ArrayFunction:
 def _finite(found: Sequence[np.ndarray]) -> np.ndarray:
     """Rows in which all results are numbers, (N,)."""
     return np.all([np.isfinite(x).all(axis=tuple(range(1, x.ndim))) for x in found], axis=0)
+
+
+def _in_closed_form(name: str, question: Question, quick: SolvedBlocks, careful, start: Mapping[str, float]):
+    blocks = quick if quick.implicit else careful()
+    if blocks.implicit:
+        return None
+    targets = [ca.densify(ca.vec(t)) for t in parted(question, blocks)[2]]
+    return ca.Function(name, [ca.vertcat(*question.arguments)], [ca.vertcat(*targets)])
 
 
 def _through(

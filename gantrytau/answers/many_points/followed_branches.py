@@ -23,6 +23,8 @@ CORRECTIONS = 8
 SETTLED = (
     1e-8  # of the unknowns in their sizes: a correction after which Newton's method has reached rounding
 )
+STARTS, STEPS = 200, 40  # of Newton's method for all solutions, and as many steps
+SAME = 1e-6  # of one, by which unknowns of one solution may differ
 ONWARD = 0.1  # of what is left of the way, the first trial after pivots are chosen anew
 
 
@@ -63,6 +65,39 @@ class FollowedBranch:
         here = np.flatnonzero(way[0] == 0)
         y[:, here] = self._corrected(z[:, here], end[:, here])
         return y
+
+    def solutions(self, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All Y (n, m) at one `end` (k,) that many starts lead to, and signs (1, m) of det df/dy, 1 as at the start."""
+        turns, begin = self._turning[:, None], self.start[:, None]
+        wide = np.where(turns, np.pi, np.maximum(1.0, np.abs(begin)))
+        y = begin + wide * np.random.default_rng(0).uniform(-1, 1, (len(begin), STARTS))
+        z, ends = y / self.units[1][:, None], np.repeat(end[:, None], STARTS, axis=1)
+        for _ in range(STEPS):
+            step = self._newton_by_value(z, ends)
+            z += np.nan_to_num(step / np.maximum(1.0, np.abs(step).max(axis=0)))
+        y = self._corrected(z, ends)
+        kept: list[int] = []
+        for k in np.flatnonzero(np.isfinite(y[0])):
+            gaps = y[:, k, None] - y[:, kept]
+            if (np.abs(np.where(turns, 2 * np.sin(gaps / 2), gaps)).max(axis=0) > SAME).all():
+                kept.append(int(k))
+        there = self._residual_at(
+            np.hstack([begin, y[:, kept]]), np.column_stack([self.begin, ends[:, kept]])
+        )[1]
+        signs = np.sign(np.linalg.det(there))
+        return y[:, kept], signs[None, 1:] * signs[0]
+
+    @cached_property
+    def _turning(self) -> np.ndarray:
+        """Which unknowns are angles: a whole turn leaves the residual as it is, (n,)."""
+        n = len(self.start)
+        beside = self.start + np.random.default_rng(0).uniform(-1, 1, n)
+        y = beside[:, None] + 2 * np.pi * np.eye(n, n + 1)
+        f, *_ = self._residual_at(y, np.repeat(self.begin[:, None], n + 1, axis=1))
+        return np.abs(f[:, :n] - f[:, n:]).max(axis=0) <= SAME
+
+    def _residual_at(self, y: np.ndarray, q: np.ndarray):
+        return self._matrices(y / self.units[1][:, None], np.ones((1, y.shape[1])), q)
 
     def _along(self, trial, way: np.ndarray, z: np.ndarray, end: np.ndarray) -> None:
         """Trials until all have arrived or do not move; way: what is left of it and the next step, (2, N), z: (n, N)."""

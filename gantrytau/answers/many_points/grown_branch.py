@@ -5,27 +5,28 @@ one about the first axis of an arm. So the branch is grown once: places in a box
 the nearest known one, the box is widened until nothing more is reached. Others are led from the nearest of those.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-
-from gantrytau.answers.many_points.through_blocks import ThroughBlocks
 
 SAMPLES = 64  # places of a round
 FIRST = 1 / 16  # of the largest argument at the start: how far the first round goes
 ROUNDS = 30
 FILLED = 512  # places within the box, in the end
-NEIGHBOURS = 3  # known points from which a place is led, before it is out of reach
+NEIGHBOURS = 3  # known points from which a place is led, each twice as far in rank, before it is out of reach
 MOST = 20000  # known points that are kept
 
 
 class GrownBranch:
-    """The branch of blocks about its start; known: arguments and unknowns (k + n, M) of points on it."""
+    """A branch about its start (k + n,), `count` = k arguments and n unknowns; known: (k + n, M) of points on it.
 
-    def __init__(self, blocks: ThroughBlocks):
-        self._blocks, self._count = blocks, blocks.count
-        self.known = blocks.start[:, None]
-        self._grow()
+    lead: unknowns (n, N) at arguments (k, N), each from a known point (k + n, N); NaN where it does not lead there.
+    """
+
+    def __init__(self, start: np.ndarray, count: int, lead: Callable[[np.ndarray, np.ndarray], np.ndarray]):
+        self._lead, self._count = lead, count
+        self.known = start[:, None]
 
     def __call__(self, q: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
         """Unknowns (n, N) at arguments q (k, N), led from their nearest known points; NaN where none of them leads."""
@@ -36,10 +37,9 @@ class GrownBranch:
                 break
             if self.known.shape[1] > size:
                 tree, size = self._nearest()
-            near = tree.query((q[:, left] / self._spread[:, None]).T, k=[min(neighbour, size - 1) + 1])[1][
-                :, 0
-            ]
-            y = self._blocks.tears_beside(q[:, left], self.known[:, near])
+            rank = min(2**neighbour, size)
+            near = tree.query((q[:, left] / self._spread[:, None]).T, k=[rank])[1][:, 0]
+            y = self._lead(q[:, left], self.known[:, near])
             good = np.isfinite(y).all(axis=0)
             found[:, left[good]] = y[:, good]
             if size < MOST:
@@ -59,7 +59,8 @@ class GrownBranch:
         spread = np.ptp(self.known[: self._count], axis=1)
         return np.where(spread > 0, spread, 1.0)
 
-    def _grow(self) -> None:
+    def grow(self) -> None:
+        """Widens a box about the known arguments until nothing more is reached."""
         random, start = np.random.default_rng(0), np.abs(self.known[: self._count])
         margin = FIRST * (start.max(initial=0.0) or 1.0)
         for _ in range(ROUNDS):

@@ -3,9 +3,11 @@
 What they are is seen at points of the branch. The rest is determined by some of the equations, often in parts that do
 not know of each other, and is followed by itself: that takes a tenth of the time. As equations are analytic, what keeps its
 value on a piece of the branch does so on all of it. Still all equations are asked in the end, and where another Jacobian of
-the whole block was singular on the way, or may have been, the whole block is followed.
+the whole block was singular on the way, or may have been, the whole block is followed. Ways around lead past such poses, as
+those in which a plate on parallelograms could begin to turn, and keep what is kept.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,7 +19,7 @@ import numpy as np
 from gantrytau.answers.implicit_blocks import SOLVED
 from gantrytau.answers.many_points.array_program import ArrayProgram
 from gantrytau.answers.many_points.elimination import pivots_in_order
-from gantrytau.answers.many_points.followed_branches import FollowedBranch
+from gantrytau.answers.many_points.followed_branches import SETTLED, FollowedBranch
 
 KEEPS = 1e-11  # of one and its size, by which a value may differ from point to point
 FEWEST = 8  # points on the branch from which it is told
@@ -36,22 +38,43 @@ class ReducedBranch:
 
     def __call__(self, end: np.ndarray) -> np.ndarray:
         """Y (n, N) at `end` (k, N); NaN where the branch does not lead there."""
-        y = np.repeat(self.kept[:, None], end.shape[1], axis=1)
-        for part, places in zip(self.parts, self.places, strict=True):
-            y[list(places)] = part(end)
-        found = np.isfinite(y).all(axis=0)
-        y[:, ~found] = np.nan  # where a part ends, so does the whole
-        error, pivots = self._judged(y[:, found], end[:, found])
+        y, holds, pivots = self._completed([part(end) for part in self.parts], end)
         with np.errstate(invalid="ignore"):
-            sure = (error[0] <= SOLVED) & (pivots > LIKE).all(axis=0) & (pivots < 1 / LIKE).all(axis=0)
-        doubtful = np.flatnonzero(found)[~sure]
+            sure = holds & (pivots > LIKE).all(axis=0) & (pivots < 1 / LIKE).all(axis=0)
+        doubtful = np.flatnonzero(np.isfinite(y[0]) & ~sure)
         if doubtful.size:
-            y[:, doubtful] = self.whole(end[:, doubtful])
+            other = self.whole(end[:, doubtful])
+            gaps = np.nan_to_num(
+                other - self.kept[:, None]
+            )  # beside what is kept, other branches have split off
+            y[:, doubtful] = np.where(np.abs(gaps).max(axis=0) <= SETTLED, other, np.nan)
         return y
 
     def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
         """See `FollowedBranch.beside`."""
-        return self.whole.beside(end, begin, start)
+        led = zip(self.parts, self.places, strict=True)
+        y, holds, _ = self._completed([part.beside(end, begin, start[list(own)]) for part, own in led], end)
+        y[:, ~holds] = np.nan
+        return y
+
+    def solutions(self, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `FollowedBranch.solutions`; a row of signs for each part."""
+        of_parts = [part.solutions(end) for part in self.parts]
+        chosen = list(itertools.product(*(range(y.shape[1]) for y, _ in of_parts)))
+        take = [[way[k] for way in chosen] for k in range(len(self.parts))]
+        parts = [y[:, own] for (y, _), own in zip(of_parts, take, strict=True)]
+        y, holds, _ = self._completed(parts, np.repeat(end[:, None], len(chosen), axis=1))
+        signs = np.vstack([sign[:, own] for (_, sign), own in zip(of_parts, take, strict=True)])
+        return y[:, holds], signs[:, holds]
+
+    def _completed(self, found: Sequence[np.ndarray], end: np.ndarray) -> tuple[np.ndarray, ...]:
+        """All unknowns from those of the parts, NaN where one ends; whether equations hold, and pivots as `_judged`."""
+        y = np.repeat(self.kept[:, None], end.shape[1], axis=1)
+        for part, places in zip(found, self.places, strict=True):
+            y[list(places)] = part
+        y[:, ~np.isfinite(y).all(axis=0)] = np.nan
+        error, pivots = self._judged(y, end)
+        return y, error[0] <= SOLVED, pivots
 
     @cached_property
     def _judged(self) -> ArrayProgram:

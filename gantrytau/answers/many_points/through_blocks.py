@@ -44,6 +44,10 @@ class LinearSolution:
         """The same: linear equations have one solution, from wherever it is led."""
         return self(known)
 
+    def solutions(self, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The same for one point, without signs."""
+        return self(known[:, None]), np.zeros((0, 1))
+
 
 class ThroughBlocks:
     """Targets through blocks as they are solved; trusted: expressions that hold where the closed forms can be trusted."""
@@ -100,6 +104,23 @@ class ThroughBlocks:
         for (used, step), (first, end) in zip(self._steps, self._places, strict=True):
             known = np.vstack([known, step.beside(known[used], there[used], there[first:end])])
         return known[len(q) :]
+
+    def solutions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unknowns (n, m) of all branches at one point (k,) and signs that tell them apart, (s, m)."""
+        known, signs = q[:, None], np.zeros((0, 1))
+        for used, step in self._steps:
+            ways = [
+                (known[:, k], signs[:, k], *step.solutions(known[used, k])) for k in range(known.shape[1])
+            ]
+            parts = [
+                [np.repeat(old[:, None], y.shape[1], axis=1) for old in (x, s)] + [y, sign]
+                for x, s, y, sign in ways
+            ]
+            known, signs = (
+                np.hstack([np.vstack([part[i], part[i + 2]]) for part in parts] or [np.zeros((0, 0))])
+                for i in (0, 1)
+            )
+        return known[len(q) :], signs
 
     def targets(self, q: np.ndarray, tears: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """Targets (m, N) and whether they can be trusted, (N,)."""

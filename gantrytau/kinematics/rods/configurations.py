@@ -23,13 +23,15 @@ SIDES = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
 class Configuration(Record):
     """One solution: q (N, n), r (N, 3), R (N, 3, 3) and feasible (N,), or one pose without the first axis.
 
-    feasible: it exists, within the bounds that the model declares, and no two links cross.
+    feasible: it exists, within the bounds that the model declares, and no two links cross. name: of a robot through its
+    equations.
     """
 
     q: np.ndarray
     r: np.ndarray
     R: np.ndarray
     feasible: np.ndarray
+    name: str = ""
 
 
 def of_joints(robot: RodRobot, q: np.ndarray, one: bool, limits: np.ndarray) -> list[Configuration]:
@@ -73,12 +75,28 @@ def of_pose(robot: RodRobot, at: Poses, limits: np.ndarray) -> list[Configuratio
     return found
 
 
+def of_signs(at: Poses, q: np.ndarray, signs: np.ndarray, limits: np.ndarray) -> list[Configuration]:
+    """Solutions q (m, n) of one pose by their signs (s, m), those as at home first."""
+    if not at.one:
+        raise ModelError(
+            f"Kinematics.configurations: found {len(at.r)} positions, expected one pose of a robot through its equations; "
+            "ask for one after the other"
+        )
+    R = np.eye(3) if at.R is None else at.R[0]
+    inside = np.all((q >= limits[:, 0]) & (q <= limits[:, 1]), axis=1)
+    named = sorted(
+        ("".join("+" if s > 0 else "-" for s in column), k) for k, column in enumerate(signs.T.tolist())
+    )
+    return [Configuration(q[k], at.r[0], R, inside[k : k + 1].all(), name) for name, k in named]
+
+
 def configuration(robot: RodRobot, q, r, R, one: bool, limits: np.ndarray) -> Configuration:
     """A solution with what can be said of it."""
     with np.errstate(invalid="ignore"):
         inside = ((q >= limits[:, 0]) & (q <= limits[:, 1])).all(axis=1)
         feasible = inside & np.isfinite(r).all(axis=1) & ~robot.crossed(q, r, R)
-    return Configuration(*answered(one, q, np.array(r), np.array(R), feasible))
+    q, r, R, feasible = answered(one, q, np.array(r), np.array(R), feasible)
+    return Configuration(q, r, R, feasible)
 
 
 def _of_turntables(robot: TurningRods, at: Poses, limits: np.ndarray) -> list[Configuration]:
