@@ -94,8 +94,13 @@ def cells(make: Callable[[np.random.Generator], Cell], seed: int, folder: Path) 
 def _reachable(cell: Cell, end: np.ndarray, solutions: int) -> bool:
     """Whether there is one solution all along the straight way on which the branch of the start is followed."""
     begin = cell.points[0]
-    way = (cell.solutions(begin + share * (end - begin)) for share in np.linspace(0.0, 1.0, 60))
-    return solutions == 1 and all(found is not None and len(found) == 1 for found in way)
+    way = [begin + share * (end - begin) for share in np.linspace(0.0, 1.0, 61)]
+    known = (cell.solutions(u) for u in way)
+    return (
+        solutions == 1
+        and len({np.sign(cell.side(u)) for u in way}) == 1
+        and all(found is not None and len(found) == 1 for found in known)
+    )
 
 
 def linkages(usual: bool, seed: int, folder: Path) -> Iterator[Asked]:
