@@ -19,8 +19,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.start.balance import balance
+from gantrytau.compiler.start.balance import NOISE, balance
+from gantrytau.compiler.start.consistency import ROUNDING
 from gantrytau.errors import SolveError
+from gantrytau.language.term_sizes import term_sizes
 from gantrytau.simulation.events.at_places import at_places
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
@@ -85,8 +87,9 @@ class Conditioning:
         self._shapes = [constraints.shape, *(m.shape for m in changing)]
         self._divisors = len(heads)
         parts = [ca.densify(constraints), *changing]
-        everything = ca.vertcat(*heads, *(ca.vec(m) for m in parts))
-        self._function = ca.Function("conditioning", list(arguments), [ca.densify(everything)], {"cse": True})
+        everything = ca.densify(ca.vertcat(*heads, *(ca.vec(m) for m in parts)))
+        self._function = ca.Function("conditioning", list(arguments), [everything], {"cse": True})
+        self._symbols = list(arguments), everything
         self._steps = [k for k in steps if ca.depends_on(everything, arguments[-1][k])]
         self._scales: dict[bytes, list[Scale]] = {}
 
@@ -119,15 +122,13 @@ class Conditioning:
     def _look(self, side: np.ndarray, *points: np.ndarray) -> Look:
         """The same on one side of all events; the first point there is the measure."""
         (values,) = at_places(self._function, *points)
-        matrices, place = [], self._divisors
-        for rows, columns in self._shapes:
-            part = values[:, place : place + rows * columns]
-            matrices.append(part.reshape(len(values), columns, rows).transpose(0, 2, 1))
-            place += rows * columns
-        constraints, *blocks = [np.nan_to_num(m, nan=0.0, posinf=0.0, neginf=0.0) for m in matrices]
+        matrices = self._matrices(values)
+        constraints, *blocks = matrices
         scales = self._scales.setdefault(side.tobytes(), [])
-        scales += [_scale(m[0]) for m in (constraints, *blocks)] if not scales else []
-        distances = [_least(m, scale) for m, scale in zip((constraints, *blocks), scales, strict=True)]
+        if not scales:
+            sure = self._sure(values[:1], [p[:1] for p in points])
+            scales += [_scale(m[0], one) for m, one in zip(matrices, sure, strict=True)]
+        distances = [_least(m, scale) for m, scale in zip(matrices, scales, strict=True)]
         sign = np.ones(len(values))
         if self._dependent:
             rows, columns, _ = scales[0]
@@ -135,10 +136,31 @@ class Conditioning:
         regular = np.all([d > LEAST for d in distances[1:]], axis=0) if blocks else np.ones(len(values), bool)
         return Look(sign, distances[0], regular)
 
+    def _matrices(self, values: np.ndarray) -> list[np.ndarray]:
+        """Constraints and blocks, (points, rows, columns), of what stands below each other in (points, values)."""
+        matrices, place = [], self._divisors
+        for rows, columns in self._shapes:
+            part = values[:, place : place + rows * columns].reshape(len(values), columns, rows)
+            matrices.append(np.nan_to_num(part.transpose(0, 2, 1), nan=0.0, posinf=0.0, neginf=0.0))
+            place += rows * columns
+        return matrices
 
-def _scale(matrix: np.ndarray) -> Scale:
+    def _sure(self, values: np.ndarray, point: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """1 where entries that are small beside their row, or beside their column, are no rounding, else 0."""
+        sizes = [np.abs(m[0]) for m in self._matrices(values)]
+        most = [(m.max(axis=1, keepdims=True, initial=0.0), m.max(axis=0, initial=0.0)) for m in sizes]
+        sure = [(m > NOISE * r) ^ (m > NOISE * c) for m, (r, c) in zip(sizes, most, strict=True)]
+        if any(np.any(one) for one in sure):
+            arguments, everything = self._symbols
+            terms = ca.Function("terms", arguments, [ca.vertcat(*term_sizes(everything.elements()))])
+            rounding = self._matrices(ROUNDING * at_places(terms, *point)[0])
+            sure = [one & (m > r[0]) for one, m, r in zip(sure, sizes, rounding, strict=True)]
+        return [one.astype(int) for one in sure]
+
+
+def _scale(matrix: np.ndarray, sure: np.ndarray) -> Scale:
     """Lengths of rows and columns, and the smallest singular value of the matrix divided by them."""
-    rows, columns = _lengths(matrix)
+    rows, columns = _lengths(matrix, sure)
     if matrix.size == 0:
         return rows, columns, 1.0
     least = np.linalg.svd(matrix / rows / columns, compute_uv=False)[-1]
@@ -146,9 +168,9 @@ def _scale(matrix: np.ndarray) -> Scale:
     return rows, columns, max(float(least), SOUND)
 
 
-def _lengths(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _lengths(matrix: np.ndarray, sure: np.ndarray | int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Lengths of rows (m, 1) and columns (1, n); one that is zero here need not be so elsewhere: it is as long as others."""
-    own_rows, own_columns = balance(matrix)
+    own_rows, own_columns = balance(matrix, sure)
     sized = own_rows * matrix * own_columns
     rows = np.linalg.norm(sized, axis=1, keepdims=True)
     rows = np.where(rows > NOTHING * rows.max(initial=0.0), rows, 1.0)

@@ -52,8 +52,8 @@ KINDS = {
 class Cell:
     """A model with an input u and an unknown x, both (n,), and where it is looked at.
 
-    solutions: every x, (k, n), that belongs to a u; None where that is not known for sure. nearest: where of these the model
-    starts; size: of each unknown, by which errors are measured.
+    solutions: every x, (k, n), that belongs to a u; None where that is not known for sure. size: of each unknown, by which
+    errors are measured; side: changes its sign where the equations are singular on the way from one u to another.
     """
 
     text: str
@@ -61,6 +61,7 @@ class Cell:
     points: tuple[np.ndarray, ...]
     solutions: Callable[[np.ndarray], np.ndarray | None]
     size: np.ndarray
+    side: Callable[[np.ndarray], float] = lambda u: 1.0
 
 
 def piecewise(rng: np.random.Generator) -> Cell:
@@ -139,10 +140,17 @@ def scaled(rng: np.random.Generator) -> Cell:
                 yield sum(rows[i] * columns[j] * m[i][j] * self.x[j] for j in range(n)) == self.u[i]
 
     def solutions(u: np.ndarray) -> np.ndarray | None:
-        m = np.array(matrix(np.longdouble(u[n]), np.cos, np.sin), dtype=np.longdouble)
-        if np.linalg.cond(m.astype(float)) > 1e4:
-            return None
-        return (eliminated(m, u[:n] / rows) / columns).astype(float)[None]
+        found = []
+        for angle in np.longdouble(u[n]) * (1 + np.finfo(float).eps * np.arange(2)):
+            m = np.array(matrix(angle, np.cos, np.sin), dtype=np.longdouble)
+            if np.linalg.cond(m.astype(float)) > 1e4:
+                return None
+            found.append((eliminated(m, u[:n] / rows) / columns).astype(float))
+        # all entries may be the sine of pi, which is rounding
+        return found[0][None] if np.allclose(*found, rtol=1e-9, atol=0.0) else None
+
+    def side(u: np.ndarray) -> float:
+        return float(np.linalg.det(matrix(u[n], np.cos, np.sin)))
 
     angles = [
         begin,
@@ -155,6 +163,7 @@ def scaled(rng: np.random.Generator) -> Cell:
         points,
         solutions,
         1 / columns,
+        side,
     )
 
 

@@ -1,69 +1,65 @@
-"""One model on five ways: function, evaluate, simulate, C and FMU. A refusal is NaN."""
+"""One model on five ways: function, evaluate, simulate, C and FMU. A refusal is the error."""
 
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 
-from gantrytau import Dae, GantryTauError, c_source, simulate
+from gantrytau import Dae, GantryTauError, SolveError, c_source, simulate
 from tests.fmu.exported import Exported, export
 from tests.fmu.runtime.raw_calls import OK
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 
+T = TypeVar("T")
 Point = Mapping[str, np.ndarray]  # values by name
-Answers = dict[str, np.ndarray]  # by route, (points, values)
+Answer = np.ndarray | GantryTauError
+Answers = dict[str, list[Answer]]  # by route, one for each point
 
 
 def answers(
     dae: Dae, points: Sequence[Point], find: Sequence[str], folder: Path, *, fmu: bool = True
 ) -> Answers:
-    """What `find` is at points that name all inputs, one below the other; fmu: compile one, too."""
-    size = sum(len(dae.expand(n)) for n in find)
+    """What `find` is at points that name all inputs; fmu: compile one, too."""
     given = list(points[0])
-    function = or_none(dae.function, given, list(find))
-    found = {
-        "function": _each(points, size, lambda p: called(function, given, p)),
-        "evaluate": _each(points, size, lambda p: flat([dae.evaluate(p)[n] for n in find])),
-        "simulate": _each(points, size, lambda p: _simulated(dae, p, find)),
+    function = attempted(dae.function, given, list(find))
+    routes: dict[str, Callable[[Point], np.ndarray]] = {
+        "function": lambda p: called(function, given, p),
+        "evaluate": lambda p: flat([dae.evaluate(p)[n] for n in find]),
+        "simulate": lambda p: _simulated(dae, p, find),
     }
-    if COMPILER is not None and function is not None:
+    if COMPILER is not None and isinstance(function, ca.Function):
         binary = compiled(function, folder)
-        found["C"] = _each(points, size, lambda p: called(binary, given, p))
+        routes["C"] = lambda p: called(binary, given, p)
     if COMPILER is not None and fmu:
-        exported = or_none(export, dae, folder / "model.fmu")
-        found["FMU"] = _each(points, size, lambda p: initialised(exported, dae, p, find))
-    return found
+        exported = attempted(export, dae, folder / "model.fmu")
+        routes["FMU"] = lambda p: initialised(exported, dae, p, find)
+    return {name: [attempted(route, p) for p in points] for name, route in routes.items()}
 
 
-def or_none(make: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
+def attempted(make: Callable[..., T], *arguments: Any, **more: Any) -> T | GantryTauError:
+    """What is made, or the refusal."""
     try:
         return make(*arguments, **more)
-    except GantryTauError:
-        return None
-
-
-def _each(points: Sequence[Point], size: int, answer: Callable[[Point], np.ndarray]) -> np.ndarray:
-    found = np.full((len(points), size), np.nan)
-    for k, point in enumerate(points):
-        try:
-            found[k] = answer(point)
-        except GantryTauError:
-            continue
-    return found
+    except GantryTauError as refusal:
+        return refusal
 
 
 def flat(values: Sequence[object]) -> np.ndarray:
-    return np.concatenate([np.asarray(v, dtype=float).ravel(order="F") for v in values])
+    """All values in one row; NaN, by which functions refuse, as an error."""
+    found = np.concatenate([np.asarray(v, dtype=float).ravel(order="F") for v in values])
+    if not np.all(np.isfinite(found)):
+        raise SolveError("NaN")
+    return found
 
 
-def called(function: ca.Function | None, given: Sequence[str], point: Point) -> np.ndarray:
-    if function is None:
-        return np.array(np.nan)
+def called(function: ca.Function | GantryTauError, given: Sequence[str], point: Point) -> np.ndarray:
+    if isinstance(function, GantryTauError):
+        raise function
     results = function.call([ca.DM(np.asarray(point[n], dtype=float).ravel(order="F")) for n in given])
     return flat([np.array(r) for r in results])
 
@@ -87,17 +83,20 @@ def _simulated(dae: Dae, point: Point, find: Sequence[str]) -> np.ndarray:
     return flat([result.final(n) for n in find])
 
 
-def initialised(exported: Exported | None, dae: Dae, point: Point, find: Sequence[str]) -> np.ndarray:
+def initialised(
+    exported: Exported | GantryTauError, dae: Dae, point: Point, find: Sequence[str]
+) -> np.ndarray:
     """What an FMU computes when its inputs are set before it starts."""
-    size = sum(len(dae.expand(n)) for n in find)
-    if exported is None:
-        return np.full(size, np.nan)
+    if isinstance(exported, GantryTauError):
+        raise exported
     with exported.new() as running:
         running.enter()
         for name, value in point.items():
             for scalar, number in zip(dae.expand(name), np.ravel(value, order="F"), strict=True):
                 running[scalar] = number
         if running.instance("ExitInitializationMode") != OK:
-            return np.full(size, np.nan)
+            raise SolveError(running.instance.message)
         status, values = running.instance.get(*(exported.references[s] for n in find for s in dae.expand(n)))
-        return np.array(values) if status == OK else np.full(size, np.nan)
+        if status != OK:
+            raise SolveError(running.instance.message)
+        return flat([values])

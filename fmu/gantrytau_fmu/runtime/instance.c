@@ -80,7 +80,7 @@ struct gt_instance {
     int parameters_stale, outputs_stale, factors_stale;
     int stepping; /* in a step: modes hold up to events */
     int counted;  /* events since counted_since, s, of one step */
-    double counted_since;
+    double counted_since, crowded; /* s */
     int all;      /* events of one step */
     int closing;  /* at its end, where samples wait for the next one */
     int sampling; /* values just before an instant are asked for: what turns there has not turned */

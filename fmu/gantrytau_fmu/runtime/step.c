@@ -4,6 +4,7 @@
 #define GT_MOST_STEPS 20000
 #endif
 #define GT_MOST_IN_A_STEP (10 * GT_MOST_STEPS) /* events of one communication step */
+#define GT_CROWDED_SHARE 1e-2 /* of a step: 100,000 events that are spread over it are none too many */
 #define GT_SHORTEST 1e-13      /* of a communication step, and of the time itself */
 #define GT_LEAST_LOOK 1e-4     /* of a communication step: shorter slips may be missed */
 #define GT_QUARTER 1.6         /* rad: what angles in margins may turn in one step */
@@ -248,7 +249,7 @@ static gt_status gt_handle_events(gt_instance *it) {
     do {
         const gt_status status = gt_update(it, &info);
         if (status != GT_OK) return status;
-        if (it->now.time - it->counted_since > GT_CROWDED_TIME) {
+        if (it->now.time - it->counted_since > it->crowded) {
             it->counted = 0;
             it->counted_since = it->now.time;
         }
@@ -260,7 +261,7 @@ static gt_status gt_handle_events(gt_instance *it) {
         if (it->counted > GT_MOST_EVENTS)
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: more than %d events within %.3g s of one communication step, the last of %s at time = "
                           "%.9g s; take a longer sampling period, or let come to rest what repeats ever faster", GT_NAME, GT_MOST_EVENTS,
-                          GT_CROWDED_TIME, it->last_event, it->now.time);
+                          it->crowded, it->last_event, it->now.time);
     } while (info.again);
     return GT_OK;
 }
@@ -290,6 +291,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
     it->stepping = 1;
     it->counted = it->all = 0;
     it->counted_since = time;
+    it->crowded = fmin(GT_CROWDED_SHARE * size, GT_CROWDED_TIME);
     if (it->now.waiting) gt_keep_before(it, 1);
     it->now.waiting = 0;
 #if GT_DELAYS

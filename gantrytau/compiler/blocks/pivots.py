@@ -13,12 +13,8 @@ import numpy as np
 from gantrytau.compiler.alphabets import Substitution, values_at
 
 COUNT = 12
-TRUSTED = (
-    1e-3  # of what a pivot is at the start, relative to its row: with less it costs more than three digits
-)
-SPREAD = (
-    0.5  # of the points about the start, relative to the values there, or absolute in SI where they are small
-)
+TRUSTED = 1e-3  # of a pivot at the start, relative to its row: with less it costs more than three digits
+SPREAD = 0.5  # of the points about the start, relative to its values, or absolute in SI where they are small
 
 
 class Guide:

@@ -18,19 +18,13 @@ from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.term_sizes import term_sizes
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
-TOLERANCE = (
-    1e-15  # of the residual, relative to the terms of its equation; rounding may stop the steps before
-)
+TOLERANCE = 1e-15  # of the terms of an equation, what may be left; rounding may stop the steps before
 SOLVED = 1e-9  # the same, for an equation to hold
-ROUNDING = (
-    1e-14  # of what unknowns of size one contribute to an equation: what is left of equations solved together
-)
+ROUNDING = 1e-14  # of what unknowns of size one contribute, what is left of equations solved together
 ITERATIONS = 100
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
 SPREAD = 0.3  # of the first of them
-NOISE = (
-    1e-9  # of a row, relative to the longest, below which it says nothing: across the plane of a planar loop
-)
+NOISE = 1e-9  # of the longest row, below which one says nothing: across the plane of a planar loop
 MOST_PIECES = 60  # that are tried
 LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle may turn in one step, rad
 

@@ -21,9 +21,7 @@ from gantrytau_optimica.control.sizes import BESIDE, SHARES
 NEAREST = 0.1  # of its largest value on the guess, as the guess itself keeps off zero
 FLOOR = 0.1  # of that margin: it is not made smaller for what a guess passes by, only for where it begins and ends
 POLE = 1e-9  # of its largest value: where a root is taken to be zero
-GROWS = (
-    1e4  # times: what an equation that divides by a root grows by at least between its margin and its pole
-)
+GROWS = 1e4  # times: what dividing by a root makes of an equation at least, from its margin to its pole
 Look = Callable[[np.ndarray], np.ndarray]
 
 

@@ -21,14 +21,10 @@ from gantrytau_optimica.control.limits import signal_limits
 
 LOOSE = 1e4  # times the size that the rest tells: a limit that is farther away says nothing of the size
 NOISE = 1e-13  # of the largest guess of a kind: what rounding leaves of a zero
-ACCIDENT = (
-    1e5  # times apart: the size that an algebraic has at the guess, and that of the terms of its equation
-)
+ACCIDENT = 1e5  # times apart: the size of an algebraic at the guess, and of the terms of its equation
 BESIDE = 0.1  # of its size: how far from the guess slopes are looked at as well, which may vanish there by accident
 FINE = 1e-4  # of the terms of a condition: its bounds are no finer measure than this
-BEYOND = (
-    1e8  # times outside of the range of all sizes that are known: what a slope tells that is left by rounding
-)
+BEYOND = 1e8  # times outside of the range of all known sizes: what a slope tells that is left by rounding
 SHARES = np.linspace(0.0, 1.0, 11)  # of the horizon, at which guesses are looked at
 
 

@@ -24,9 +24,7 @@ MANY = 4000  # points that are fitted: of longer recordings, means of as many ne
 PASSES = 4  # of fitting and measuring along the fitted path
 STILL = 20.0  # extent over noise below which nothing but noise was recorded
 FINEST = 15.0  # length of a span over noise: finer ones would draw the noise of a pause
-STRAY = (
-    12.0  # distance over noise from the points recorded before and after, beyond which a point is left out
-)
+STRAY = 12.0  # times the noise: the distance from points before and after, beyond which one is left out
 
 
 @dataclass(frozen=True, eq=False)

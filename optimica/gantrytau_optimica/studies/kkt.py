@@ -23,9 +23,7 @@ from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.program import Program
 
-CLEAR = (
-    100.0  # times larger than the other must be a multiplier or a distance, both relative, to be told apart
-)
+CLEAR = 100.0  # times larger than the other: a multiplier or a distance, both relative, that is told apart
 LEAST = 1e-13  # distance from a limit, below which Ipopt's solutions do not go
 TINY = 1e-30  # in place of zeros on the diagonal: pivots that vanish make SuperLU write to the console
 SINGULAR = 1e14  # condition number from which on nothing is left of 16 digits

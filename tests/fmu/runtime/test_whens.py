@@ -16,6 +16,7 @@ from gantrytau import (
     pre,
     reinit,
     sampled,
+    sin,
     terminate,
     time,
     when,
@@ -285,6 +286,17 @@ def test_bounces_that_come_ever_faster_end_with_the_name_of_their_condition(fmus
         assert "when((h<=0))" in run.instance.message
         assert "more than 1000 events" in run.instance.message
         assert run["time"] == pytest.approx(over, abs=1e-3)
+
+
+def test_switches_that_are_dense_all_along_a_step_are_none_too_many(tmp_path):
+    class Carrier(Model):
+        n = Discrete(0)
+
+        def equations(self):
+            yield when(sin(2 * math.pi * 1e7 * time) > 0.5, self.n == pre(self.n) + 1)
+
+    export_fmu(Carrier(), tmp_path / "carrier.fmu")
+    assert run_fmu(tmp_path / "carrier.fmu", stop=2e-4, step=1e-4).final("n") == 2000
 
 
 @VERSIONS

@@ -11,9 +11,7 @@ from gantrytau_optimica.control.control_problem import Course, Phase, Signal
 from gantrytau_optimica.control.first_guesses.completion import Completion, Driven, driven
 
 Guess = Callable[[np.ndarray], np.ndarray]
-LEAST_ROOT = (
-    0.1  # of its largest value on the guess: square roots are kept away from zero, where forces explode
-)
+LEAST_ROOT = 0.1  # of its largest value on the guess: roots are kept away from zero, where forces explode
 MOST_PLACES = 120  # at which Newton's method completes a guess; between them it is drawn straight
 MOST_KEPT = 4  # answers that are remembered: at places, and beside them for slopes
 SLOPE = 1e-4  # of the horizon: between values of which slopes of guesses are taken
