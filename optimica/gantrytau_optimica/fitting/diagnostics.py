@@ -17,7 +17,7 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.facts import Fact
-from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays
 
 CHANCE = 1e-5  # of a finding on sound data, by each test
@@ -37,8 +37,9 @@ class ResidualSeries:
     name: of the quantity, the same in all runs; left: measured less model (N,), NaN in rows that do not count; measured:
     what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: slopes of the model by what was
     fitted (N, k); signals: known ones (N,) that it may follow, "q of x", "v of x", "a of x", "sign v of x", "1", "time" in
-    s, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run", "sensor"; rows: their numbers
-    in the data; run: its name, where there are several; band: share of the frequencies that a filter has left.
+    s, "poses": their numbers, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run",
+    "sensor"; rows: their numbers in the data; run: its name, where there are several; band: share of the frequencies that a
+    filter has left.
     """
 
     name: str
@@ -201,6 +202,17 @@ def repeated(courses: Mapping[str, np.ndarray]) -> list[Fact]:
     ]
 
 
+def repeated_rows(name: str, values: np.ndarray, rows: np.ndarray) -> list[Fact]:
+    """Rows (N, k) of numbers with noise that are the same as earlier ones; rows: their numbers in the data."""
+    _, first, which = np.unique(values, axis=0, return_index=True, return_inverse=True, equal_nan=True)
+    before = first[which.ravel()]
+    again = np.flatnonzero(before != np.arange(len(values)))
+    if not again.size:
+        return []
+    cause = f"{name} of {rows_in_words(rows[before[again]])}"
+    return [Fact("duplicates", rows_in_words(rows[again]), float(again.size), rows[again], cause)]
+
+
 def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
     from scipy.special import fdtrc
 
@@ -285,7 +297,7 @@ def _trends(one: _Quantity) -> Iterator[Fact]:
         variance *= len(x) / max(len(x) - one.jacobian.shape[1] - 1, 1)
         share = slope**2 * size / whole
         deviations = abs(slope) * size / np.sqrt(variance) if variance > 0 else np.inf
-        kind = {"time": "drift", "rate": "delay"}.get(name, "trend")
+        kind = {"time": "drift", "poses": "drift", "rate": "delay"}.get(name, "trend")
         amount = -slope if kind == "delay" else slope
         yield Fact(kind, one.name, amount, cause=name, share=share, deviations=float(deviations))
 

@@ -9,7 +9,7 @@ from gantrytau import GantryTauError
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.opencv import VisionError
-from gantrytau_optimica.vision.reconstruction.adjustment import adjusted, started
+from gantrytau_optimica.vision.reconstruction.adjustment import LEAST_SIGMA, adjusted, started
 from gantrytau_optimica.vision.reconstruction.bundle import PRIOR, Bundle, State
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
@@ -84,7 +84,7 @@ def suspected(
         more = "; lengths are those of spacing" if abs(size - 1) > CONTRADICTED else ""
         found.append(Finding("size", rows, words + more))
     left = left_over(bundle, state)
-    for words, other in _freed(bundle, state):
+    for words, other in _freed(bundle, state) if left > LEAST_SIGMA else ():
         if other < CLEARLY * left:
             found.append(
                 Finding("images", rows, f"image points miss by {left:.3g} pixel in the median; {words}")
