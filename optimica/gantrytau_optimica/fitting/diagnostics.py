@@ -27,6 +27,7 @@ FOLLOWS = 0.1  # of what is left, that a trend must be to be told
 COMPUTED = 1e-6  # of the signal: what computed data leave, that have no noise
 ALIKE = ("explains nothing", "not white")  # facts that quantities have together
 FEW = 8  # rows, below which nothing is asked
+ACCIDENT = 4  # rows that are the same, below which that may be one
 CLIPPED = 5.0  # robust deviations: a single stray is no group
 
 
@@ -169,14 +170,13 @@ def diagnose(
     ]
     asked = []
     for one in quantities:
-        count = len(one.left)
-        if count < FEW or count <= one.jacobian.shape[1] + 2 or not one.left @ one.left > 0:
-            continue
+        count, square = len(one.left), float(one.left @ one.left)
         measured, noise = (one.together([getattr(s, n) for s in one.series]) for n in ("measured", "noise"))
-        if measured is not None:
-            found[0][one.name] = 1.0 - float(one.left @ one.left) / max(float(measured @ measured), 1e-300)
-            if one.left @ one.left <= COMPUTED**2 * (measured @ measured):
-                continue
+        whole = float(measured @ measured) if measured is not None else 0.0
+        if whole > 0:
+            found[0][one.name] = 1.0 - square / whole
+        if count < FEW or count <= one.jacobian.shape[1] + 2 or not square > COMPUTED**2 * whole:
+            continue
         own = list(_explained(one, measured))
         size = [] if noise is None else list(_size(one, noise, found[1]))
         if not any(f.kind == "noise smaller" for f in size):
@@ -198,7 +198,7 @@ def repeated(courses: Mapping[str, np.ndarray]) -> list[Fact]:
     return [
         Fact("duplicates", name, float(len(seen[name] & seen[other])), cause=other)
         for (j, name), other in ((pair, o) for pair in enumerate(seen) for o in list(seen)[: pair[0]])
-        if len(seen[name] & seen[other]) > max(FEW, min(len(seen[name]), len(seen[other])) / 2)
+        if len(seen[name] & seen[other]) > max(ACCIDENT - 1, min(len(seen[name]), len(seen[other])) / 2)
     ]
 
 
