@@ -145,19 +145,11 @@ def _judged(
     rows: list[LogRows], problem: RigidRegression, limits: ParameterLimits
 ) -> tuple[float, list[Finding]]:
     """What a fit of the first half of each log leaves of the second."""
-    halves = [[r.part(s) for r in rows for s in (half(len(r.b)),)] for half in (_first, _second)]
+    halves = [[r.half(k) for r in rows] for k in (0, 1)]
     if not all(any(np.any(r.moving) for r in half) for half in halves):
         return np.nan, []
     first, second = map(factors_of, halves)
     return half_against_half((first, second), fit(first, problem.nominal, limits).p)
-
-
-def _first(count: int) -> slice:
-    return slice(0, count // 2)
-
-
-def _second(count: int) -> slice:
-    return slice(count // 2, count)
 
 
 def _identified(
