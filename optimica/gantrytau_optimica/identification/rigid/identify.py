@@ -43,9 +43,7 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 FALLS = (0.01, 1.0)  # m/s between which a Stribeck speed is looked for
 CAUSES = ("delay", "law of friction", "fixed", "noise of positions")  # of what else is left
 SIGNS = ("not white", "outliers")  # told where no cause is
-INFLATED = (
-    10.0  # times the deviation that a parameter would have alone: errors of the model weigh as much more
-)
+INFLATED = 10.0  # times the deviation of a parameter alone: errors of the model weigh as much more
 
 
 def identify(
@@ -186,10 +184,8 @@ def _identified(
             [r.thinned * np.nansum(e**2, axis=0) for r, e in zip(rows, left, strict=True)], axis=0
         ),
         condition=found.condition,
-        weak=tuple(
-            n for n, sure, held in zip(names, told, found.active, strict=True) if not sure and not held
-        ),
-        active=tuple(n for n, held in zip(names, found.active, strict=True) if held),
+        weak=tuple(np.array(names, dtype=object)[~told & ~found.active]),
+        active=tuple(np.array(names, dtype=object)[found.active]),
         base=found.base.words(names),
         nonlinear=(),
         stribeck_speed=friction.fall if friction and friction.law == "stribeck" else None,

@@ -132,18 +132,17 @@ def _begun(bundle: Bundle) -> tuple[Bundle, State, BlockRows, int]:
 def _of_all_poses(
     bundle: Bundle, state: State, placed: Located, rows: Array, detections: Detections, left: Diagnostics
 ) -> Reconstruction:
-    cameras, count = detections.found.shape
-    points = detections.corners.shape[2]
-    r, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
-    R, residuals = np.full((count, 3, 3), np.nan), np.full((cameras, count, points, 2), np.nan)
-    shared = np.full((count, *placed.shared.shape[1:]), np.nan)
-    r[rows], covariance[rows], shared[rows], R[rows] = placed.r, placed.covariance, placed.shared, state.R
-    residuals[:, rows] = bundle.residuals(state)
+    def of_all(found: Array) -> Array:
+        whole = np.full((len(detections.numbers), *found.shape[1:]), np.nan)
+        whole[rows] = found
+        return whole
+
+    residuals = np.swapaxes(of_all(np.swapaxes(bundle.residuals(state), 0, 1)), 0, 1)
     return Reconstruction(
-        r=r,
-        R=R,
-        covariance=covariance,
-        shared=shared,
+        r=of_all(placed.r),
+        R=of_all(state.R),
+        covariance=of_all(placed.covariance),
+        shared=of_all(placed.shared),
         cameras=state.cameras,
         rms=float(np.sqrt(np.nanmean(residuals**2))),
         residuals=residuals,
