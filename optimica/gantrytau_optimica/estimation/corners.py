@@ -7,9 +7,7 @@ from gantrytau.language.piecewise import Turn, switched
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase
 from gantrytau_optimica.transcription.mesh import Mesh, with_borders
 
-BENT = (
-    1e-9  # of the range of an input: a change of its slope, times the distance of samples, that is a corner
-)
+BENT = 1e-9  # of the range of an input: a change of its slope, times the distance of samples, at a corner
 LOOKED = 4000  # places of a horizon at which switches that are no plain times are looked for
 BISECTIONS = 60
 SAMPLED = 100_000  # places of a horizon at which equations are looked at that depend on time

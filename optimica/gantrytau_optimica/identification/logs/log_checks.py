@@ -155,12 +155,9 @@ def _forces(rows: np.ndarray, fits: PlainFits | None, period: float) -> Iterator
     if fits is None:
         return
     if fits.lag:
-        words = f"forces are {abs(fits.lag)} samples {'late' if fits.lag > 0 else 'early'} ({abs(fits.lag) * period * 1e3:.3g}"
-        yield Finding(
-            "delay",
-            rows,
-            f"{words} ms): that fits the motion best; shift the columns of f by {-fits.lag:+d} rows",
-        )
+        late, ms = "late" if fits.lag > 0 else "early", abs(fits.lag) * period * 1e3
+        words = f"forces are {abs(fits.lag)} samples {late} ({ms:.3g} ms): that fits the motion best"
+        yield Finding("delay", rows, f"{words}; shift the columns of f by {-fits.lag:+d} rows")
     if fits.reversed:
         words = "forces take power out of the motion at all speeds, in all actuators: friction would drive the robot"
         yield Finding("sign of force", rows, f"{words}; change the sign of f")

@@ -73,8 +73,10 @@ def _apart(form: MechanicalForm, direct: MechanicalForm) -> Iterator[tuple[str, 
     changes = {name: float(np.linalg.norm(a - b) / np.linalg.norm(a)) for name, (a, b) in pairs.items()}
     if max(changes.values()) > APART:
         words = " and ".join(f"{name} by {change:.0%}" for name, change in changes.items())
-        told = f"the direct route differs from the fit in {words}: neither is sure; look at `plot_bode` of both, and identify "
-        yield "disagreement", f"{told}a model from more data"
+        told = (
+            f"the direct route differs from the fit in {words}: neither is sure; look at `plot_bode` of both"
+        )
+        yield "disagreement", f"{told}, and identify a model from more data"
 
 
 def _unexplained(missed: float) -> Iterator[tuple[str, str]]:

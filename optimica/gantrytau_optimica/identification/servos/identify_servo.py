@@ -11,11 +11,7 @@ from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRo
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse, check_steps
 
-TOLD = (
-    "duplicates",
-    "outliers",
-    "group",
-)  # friction and limits colour what is left, and are told by themselves
+TOLD = ("duplicates", "outliers", "group")  # what friction and limits colour is told by themselves
 FOLLOWS = 30.0  # % of the motion, below which positions do not follow references
 
 

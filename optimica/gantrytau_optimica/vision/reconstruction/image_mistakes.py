@@ -17,9 +17,7 @@ Array = np.ndarray
 OFF = 0.1  # of distances along the guideways, by which places may miss them before lenses are known
 ANOTHER_SIZE = 1.25  # times the side of the pattern, beyond which spacing and side contradict each other
 SIZE_TOLD = 0.01  # of the side of the pattern, by which spacing must say it is another to be told
-CONTRADICTED = (
-    0.05  # of the side, by which spacing says it is another, from which on spacing is believed alone
-)
+CONTRADICTED = 0.05  # of the side, by which spacing must say it is another to be believed alone
 LARGE = 0.3  # pixel, of what is left of image points, above which reasons are looked for
 REFUSED, NOISY = 1.0, 3.0  # pixel, and deviations of a corner, above which images do not belong together
 CLEARLY = 0.93  # of what is left, below which what is held is better let go: noise gains 2 % by it
