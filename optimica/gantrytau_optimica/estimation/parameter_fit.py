@@ -213,10 +213,8 @@ class ParameterFit(Record):
         """Words for outputs without deviations that the model meets as closely as only computed values are met."""
         explained = {} if self.known or self.freedom <= 0 else self.diagnostics.explained
         names = [n for n, share in explained.items() if 1 - share <= COMPUTED**2]
-        return [
-            f"the residuals of {', '.join(names)} are below {COMPUTED:g} of the values, as those of computed data: the "
-            "deviations are those of rounding, not of measuring"
-        ] * bool(names)
+        words = f"the residuals of {', '.join(names)} are below {COMPUTED:g} of the values, as those of computed data"
+        return [f"{words}: the deviations are those of rounding, not of measuring"] if names else []
 
     def _mesh_words(self) -> list[str]:
         """What the mesh costs, where that matters, and why it was not made finer."""
