@@ -11,7 +11,6 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.problem.optimization import Free, Optimization
 
 EXPECTED = 0.01  # of the spread of the data: their noise, until the fit tells it
-FEW_ALIKE = 4  # values, from which on equal ones are no accident
 SPREAD = 1e-9  # of the largest value: what does not spread more is constant
 
 
@@ -141,34 +140,14 @@ def expected_noise(experiments: Sequence[Experiment]) -> dict[str, float]:
     return found
 
 
-def told_twice(experiments: Sequence[Experiment]) -> list[str]:
-    """Words for measured courses that are the same as others: values that are measured twice are never equal."""
-    columns = [
-        (f"{name}{f' (column {k})' if s.values.shape[1] > 1 else ''} of {e.name}", e, s.times, column)
+def courses(experiments: Sequence[Experiment]) -> dict[str, np.ndarray]:
+    """Times and values (N, 1 + k) of what moves, by what was measured."""
+    return {
+        f"{name} of {e.name}": np.column_stack([s.times, s.values])
         for e in experiments
         for name, s in e.measured.items()
-        for k, column in enumerate(s.values.T)
-    ]
-    found: dict[tuple[str, str], list[str]] = {}
-    for j, (what, mine, times, values) in enumerate(columns):
-        for other, theirs, moments, before in columns[:j]:
-            if _same(times, values, moments, before):
-                found.setdefault((theirs.name, mine.name), []).append(f"{other} and {what}")
-    return [
-        f"{pairs[0]} hold the same values{f' (and {len(pairs) - 1} more)' if len(pairs) > 1 else ''}: if they were measured "
-        "once, give them once, as deviations come out too small"
-        for pairs in found.values()
-    ]
-
-
-def _same(times: np.ndarray, values: np.ndarray, moments: np.ndarray, others: np.ndarray) -> bool:
-    """Whether most values of the shorter course stand at the same times in the other, or the courses are equal."""
-    if values.size == others.size >= FEW_ALIKE and np.array_equal(values, others):
-        return bool(np.ptp(values) > 0)
-    _, mine, theirs = np.intersect1d(times, moments, return_indices=True)
-    alike = values[mine] == others[theirs]
-    enough = 2 * np.sum(alike) > min(values.size, others.size)
-    return bool(enough and np.sum(alike) >= FEW_ALIKE and np.ptp(values[mine][alike]) > 0)
+        if np.any(np.ptp(s.values, axis=0) > 0)
+    }
 
 
 def replaced(experiment: Experiment, **changes: Any) -> Experiment:

@@ -17,10 +17,7 @@ from gantrytau_optimica.transcription.program import Program
 
 STEPS = 25
 SETTLED = 1e-5  # of a deviation, or
-ROUGH, FIRM = (
-    1e-3,
-    1e-2,
-)  # of it, that rounding may leave, and that limits of the model must cost to be said to bind
+ROUGH, FIRM = 1e-3, 1e-2  # of it, that rounding may leave, and that limits of the model must cost to bind
 FINE = 1e-11  # of its size: a step of a number that changes nothing more
 SHARES = 0.5 ** np.arange(12)
 RANK = 1e-11  # of the largest singular value of normed slopes: directions in which no step is taken

@@ -25,9 +25,7 @@ from gantrytau_optimica.transcription.transcribe import transcribe
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
 FINE, FINEST = 1e-7, 1e-11  # of its size, without and with deviations of the data
 SCATTER = 0.1  # of the scatter of chi-square, by which the mesh may raise it
-CANCELLED = (
-    2.0  # times that: the root of the squares of what elements contribute, which may cancel each other
-)
+CANCELLED = 2.0  # times that: the root of the squares of elements, which may cancel each other
 MOST_OF = 0.6  # of the elements: where as many are cut, all are
 MUCH = 200.0  # times its share, from which on an element is cut twice
 INNER = 0.02  # of an element, off its ends: where it is cut at a corner

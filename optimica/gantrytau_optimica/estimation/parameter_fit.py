@@ -13,15 +13,14 @@ from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.estimation.experiments import Experiment, told_twice
+from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
-from gantrytau_optimica.estimation.weights import median_deviation
 from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
-from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
+from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
+from gantrytau_optimica.fitting.robust import robust_deviation
 
 FEW = 3  # samples, of which rates are known
 STRONG = 0.99  # correlation from which on two parameters are hardly told apart
-COMPUTED = 1e-6  # of the data: residuals that no measurement leaves
 COLOURED = ("not white", "trend", "drift", "delay")  # facts of residuals that are no noise
 ROBUST = ("outliers", "group", "noise larger", "noise smaller")  # what a robust fit expects
 STRAYS = "look at them, leave them out, or take loss='robust'"
@@ -83,7 +82,7 @@ class ParameterFit(Record):
     def noise(self) -> float:
         """Standard deviation of the residuals by `scales`, of a robust fit by the median of their amounts."""
         if self.loss == "robust":
-            return float(median_deviation(self.errors))
+            return robust_deviation(self.errors)
         return float(np.sqrt(self.variance))
 
     @property
@@ -115,7 +114,9 @@ class ParameterFit(Record):
     def diagnostics(self) -> Diagnostics:
         """What is left of each output: explained share, size against given deviations, whiteness, strays, trends."""
         squares = self.loss == "squares"
-        found = diagnose(self._series, remedies={"outliers": STRAYS})
+        found = diagnose(
+            self._series, known=repeated(courses(self.experiments)), remedies={"outliers": STRAYS}
+        )
         return replace(found, facts=tuple(f for f in found.facts if squares or f.kind not in ROBUST))
 
     @property
@@ -201,7 +202,7 @@ class ParameterFit(Record):
             for j, b in enumerate(self.names[:i])
             if abs(correlation[i, j]) > STRONG
         ]
-        found += [*self._mesh_words(), *told_twice(self.experiments)]
+        found += self._mesh_words()
         if self.limited:
             found.append(
                 "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them"
@@ -210,24 +211,10 @@ class ParameterFit(Record):
 
     def _computed(self) -> list[str]:
         """Words for outputs without deviations that the model meets as closely as only computed values are met."""
-        if self.known or self.freedom <= 0:
-            return []
-        left: dict[str, list[np.ndarray]] = {}
-        whole: dict[str, list[np.ndarray]] = {}
-        for (experiment, name), residual in self.residuals.items():
-            values = next(e for e in self.experiments if e.name == experiment).measured[name].values
-            left.setdefault(name, []).append(residual.ravel())
-            whole.setdefault(name, []).append(values.ravel())
-        parts = {n: np.linalg.norm(np.concatenate(v)) for n, v in left.items()}
-        sizes = {n: np.linalg.norm(np.concatenate(v)) for n, v in whole.items()}
-        names = [n for n in parts if 0 < sizes[n] and parts[n] <= COMPUTED * sizes[n]]
-        if not names:
-            return []
-        worst = max(parts[n] / sizes[n] for n in names)
-        return [
-            f"the residuals of {', '.join(names)} are {worst:.1g} of the values, as those of computed data: the deviations "
-            "are those of rounding, not of measuring"
-        ]
+        explained = {} if self.known or self.freedom <= 0 else self.diagnostics.explained
+        names = [n for n, share in explained.items() if 1 - share <= COMPUTED**2]
+        words = f"the residuals of {', '.join(names)} are below {COMPUTED:g} of the values, as those of computed data"
+        return [f"{words}: the deviations are those of rounding, not of measuring"] if names else []
 
     def _mesh_words(self) -> list[str]:
         """What the mesh costs, where that matters, and why it was not made finer."""

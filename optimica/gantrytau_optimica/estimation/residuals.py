@@ -26,10 +26,7 @@ from gantrytau_optimica.transcription.program import Program
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
-CLOSER, CHORD = (
-    1e-12,
-    0.1,
-)  # the last one with slopes of another point, and how much each of these has to gain
+CLOSER, CHORD = 1e-12, 0.1  # the last one with slopes of another point, and what each of these must gain
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,14 +13,11 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau_optimica.fitting.robust import robust_deviation
+
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
-FEWEST = (
-    2  # degrees of freedom from which the noise of an output is estimated; below, it is that of the others
-)
-HUBER = (
-    1.345  # standard deviations beyond which errors count linearly: 95 % as efficient where noise is normal
-)
-NORMAL = 1.4826  # standard deviation over median deviation of a normal distribution
+FEWEST = 2  # degrees of freedom from which an output has its own noise; below, it is that of the others
+HUBER = 1.345  # deviations beyond which errors count linearly: 95 % as efficient where noise is normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,23 +65,19 @@ class Weighing:
         noise = before.noise if self.known else self._noise(errors, jacobian, before)
         if self.loss == "squares":
             return Weights(noise, before.huber)
-        return Weights(noise, huber_weights(errors / noise, 1.0))
+        return Weights(noise, np.minimum(1.0, HUBER * noise / np.maximum(np.abs(errors), 1e-300)))
 
     def _noise(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> np.ndarray:
         mine = [np.flatnonzero(self.outputs == g) for g in range(self.count)]
         if self.loss == "robust":
-            found = [float(median_deviation(errors[rows])) for rows in mine]
-            return self._spread(np.maximum(found, LEAST))
+            return np.maximum([robust_deviation(errors[rows]) for rows in mine], LEAST)[self.outputs]
         told = _told(jacobian * before.roots[:, None])
         freedom = np.array([rows.size - np.sum(told[rows]) for rows in mine])
         sums = np.array([np.sum(errors[rows] ** 2) for rows in mine])
         own = freedom >= FEWEST
         others = np.sqrt(np.sum(sums) / max(np.sum(freedom), 1.0))
         found = np.where(own, np.sqrt(sums / np.where(own, freedom, 1.0)), others)
-        return self._spread(np.maximum(found, LEAST))
-
-    def _spread(self, by_output: np.ndarray) -> np.ndarray:
-        return np.asarray(by_output)[self.outputs]
+        return np.maximum(found, LEAST)[self.outputs]
 
 
 def _told(slopes: np.ndarray) -> np.ndarray:
@@ -92,13 +85,3 @@ def _told(slopes: np.ndarray) -> np.ndarray:
     norms = np.linalg.norm(slopes, axis=0)
     basis, singular, _ = np.linalg.svd(slopes / np.where(norms > 0, norms, 1.0), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)
-
-
-def median_deviation(errors: np.ndarray) -> np.ndarray:
-    """The standard deviation by the median of the amounts of errors (N, ...), which stray values do not move."""
-    return NORMAL * np.median(np.abs(errors), axis=0)
-
-
-def huber_weights(errors: np.ndarray, deviation: float | np.ndarray) -> np.ndarray:
-    """Weights at most 1 of the squares of errors (N, ...) with this standard deviation."""
-    return np.minimum(1.0, HUBER * deviation / np.maximum(np.abs(errors), 1e-300))

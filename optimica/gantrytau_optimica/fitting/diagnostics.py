@@ -17,7 +17,7 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.facts import Fact
-from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays
 
 CHANCE = 1e-5  # of a finding on sound data, by each test
@@ -27,6 +27,7 @@ FOLLOWS = 0.1  # of what is left, that a trend must be to be told
 COMPUTED = 1e-6  # of the signal: what computed data leave, that have no noise
 ALIKE = ("explains nothing", "not white")  # facts that quantities have together
 FEW = 8  # rows, below which nothing is asked
+ACCIDENT = 4  # rows that are the same, below which that may be one
 CLIPPED = 5.0  # robust deviations: a single stray is no group
 
 
@@ -37,8 +38,9 @@ class ResidualSeries:
     name: of the quantity, the same in all runs; left: measured less model (N,), NaN in rows that do not count; measured:
     what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: slopes of the model by what was
     fitted (N, k); signals: known ones (N,) that it may follow, "q of x", "v of x", "a of x", "sign v of x", "1", "time" in
-    s, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run", "sensor"; rows: their numbers
-    in the data; run: its name, where there are several; band: share of the frequencies that a filter has left.
+    s, "poses": their numbers, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run",
+    "sensor"; rows: their numbers in the data; run: its name, where there are several; band: share of the frequencies that a
+    filter has left.
     """
 
     name: str
@@ -168,14 +170,13 @@ def diagnose(
     ]
     asked = []
     for one in quantities:
-        count = len(one.left)
-        if count < FEW or count <= one.jacobian.shape[1] + 2 or not one.left @ one.left > 0:
-            continue
+        count, square = len(one.left), float(one.left @ one.left)
         measured, noise = (one.together([getattr(s, n) for s in one.series]) for n in ("measured", "noise"))
-        if measured is not None:
-            found[0][one.name] = 1.0 - float(one.left @ one.left) / max(float(measured @ measured), 1e-300)
-            if one.left @ one.left <= COMPUTED**2 * (measured @ measured):
-                continue
+        whole = float(measured @ measured) if measured is not None else 0.0
+        if whole > 0:
+            found[0][one.name] = 1.0 - square / whole
+        if count < FEW or count <= one.jacobian.shape[1] + 2 or not square > COMPUTED**2 * whole:
+            continue
         own = list(_explained(one, measured))
         size = [] if noise is None else list(_size(one, noise, found[1]))
         if not any(f.kind == "noise smaller" for f in size):
@@ -197,8 +198,19 @@ def repeated(courses: Mapping[str, np.ndarray]) -> list[Fact]:
     return [
         Fact("duplicates", name, float(len(seen[name] & seen[other])), cause=other)
         for (j, name), other in ((pair, o) for pair in enumerate(seen) for o in list(seen)[: pair[0]])
-        if len(seen[name] & seen[other]) > max(FEW, min(len(seen[name]), len(seen[other])) / 2)
+        if len(seen[name] & seen[other]) > max(ACCIDENT - 1, min(len(seen[name]), len(seen[other])) / 2)
     ]
+
+
+def repeated_rows(name: str, values: np.ndarray, rows: np.ndarray) -> list[Fact]:
+    """Rows (N, k) of numbers with noise that are the same as earlier ones; rows: their numbers in the data."""
+    _, first, which = np.unique(values, axis=0, return_index=True, return_inverse=True, equal_nan=True)
+    before = first[which.ravel()]
+    again = np.flatnonzero(before != np.arange(len(values)))
+    if not again.size:
+        return []
+    cause = f"{name} of {rows_in_words(rows[before[again]])}"
+    return [Fact("duplicates", rows_in_words(rows[again]), float(again.size), rows[again], cause)]
 
 
 def _explained(one: _Quantity, measured: np.ndarray | None) -> Iterator[Fact]:
@@ -286,7 +298,7 @@ def _trends(one: _Quantity) -> Iterator[Fact]:
         variance *= len(x) / max(len(x) - one.jacobian.shape[1] - 1, 1)
         share = slope**2 * size / whole
         deviations = abs(slope) * size / np.sqrt(variance) if variance > 0 else np.inf
-        kind = {"time": "drift", "rate": "delay"}.get(name, "trend")
+        kind = {"time": "drift", "poses": "drift", "rate": "delay"}.get(name, "trend")
         amount = -slope if kind == "delay" else slope
         yield Fact(kind, one.name, amount, cause=name, share=share, deviations=float(deviations))
 

@@ -26,7 +26,7 @@ WORDS = {  # kind -> what was found
     "group": "{cause} leaves {size:.3g} times as much as the others",
     "trend": "what is left of {quantity} follows {cause}, by {size:.4g} of its unit: {share:.0%} of it, {deviations:.0f} "
     "deviations off zero",
-    "drift": "what is left of {quantity} drifts over time, by {size:.4g} a second: {share:.0%} of it",
+    "drift": "what is left of {quantity} drifts over {cause}, by {size:.4g} a {step}: {share:.0%} of it",
     "delay": "{quantity} comes {size:.4g} s {side}: that is {share:.0%} of what is left",
     "limit": "{quantity} stands at its limit {held:.6g}, data want {wanted:.6g}, {deviations:.3g} deviations beyond",
     "fixed": "{quantity} is fixed at {held:.6g}, data want {wanted:.6g}, {deviations:.3g} deviations off",
@@ -71,6 +71,7 @@ class Fact(Record):
     def finding(self) -> Finding:
         """The fact in words."""
         values = vars(self) | {"rows": rows_in_words(self.rows), "side": "late" if self.size > 0 else "early"}
+        values["step"] = {"time": "second", "poses": "pose"}.get(self.cause, "")
         if self.kind == "delay":
             values["size"] = abs(self.size)
         likeliest = CAUSES.get("time" if self.kind == "drift" else self.cause.partition(" of ")[0], "")

@@ -6,9 +6,7 @@ NORMAL = 1.4826  # standard deviation over median deviation of a normal distribu
 OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
 CHANCE = 1e-6  # that noise of few values exceeds the limit
 ROUNDS = 10  # of weighing anew
-BISQUARE = (
-    4.685  # robust deviations from which on errors do not count: 95 % as efficient where noise is normal
-)
+BISQUARE = 4.685  # robust deviations, from which errors do not count: 95 % as efficient where noise is normal
 
 
 def limit(freedom: float) -> float:

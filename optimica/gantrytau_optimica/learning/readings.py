@@ -18,12 +18,8 @@ def with_readings(
     for letter, exact in true.items():
         read = exact + deviations[letter] * random.standard_normal(exact.shape)
         values |= {f"measured.{letter}[{k}]": column for k, column in enumerate(read.T)}
-        units[f"measured.{letter}"] = {
-            "q": unit,
-            "r": "m",
-            "a": "m/s2",
-            "f": "N" if unit == "m" else "N.m",
-        }[letter]
+        force = "N" if unit == "m" else "N.m"
+        units[f"measured.{letter}"] = {"q": unit, "r": "m", "a": "m/s2", "f": force}[letter]
     return Result(run.time, values, units=units, title=run.title)
 
 

@@ -15,9 +15,7 @@ from gantrytau_optimica.vision.opencv import VisionError
 Array = np.ndarray
 SCALE = {np.dtype(np.uint8): 1.0, np.dtype(np.uint16): 255 / 65535}
 LIGHTNESS = np.array([0.114, 0.587, 0.299], dtype=np.float32)  # of blue, green, red (BT.601)
-SPARSE = (
-    4  # of files whose numbers have gaps: rows for each number if they are at most so many times the files
-)
+SPARSE = 4  # times the files: as many numbers, with gaps, have a row each
 _NUMBER = re.compile(r"(\d+)\D*$")
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.named_covariance import named_covariance
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
 from gantrytau_optimica.identification.friction.figures import draw_friction
@@ -47,15 +47,7 @@ class Friction(Record):
         By the scatter of runs about the fit; infinite without runs to spare. Raises ModelError for names that are not
         among `.names`.
         """
-        wanted = list(self.names if names is None else names)
-        strange = [name for name in wanted if name not in self.names]
-        if strange:
-            raise ModelError(
-                f"Friction.covariance: found {strange[0]!r}, expected names among {', '.join(self.names)}",
-                argument="names",
-            )
-        rows = [self.names.index(name) for name in wanted]
-        return self.matrix[np.ix_(rows, rows)]
+        return named_covariance("Friction", self.names, self.matrix, names)
 
     @property
     def deviations(self) -> dict[str, float]:

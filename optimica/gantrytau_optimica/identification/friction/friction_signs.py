@@ -36,20 +36,17 @@ def _missing(a: ActuatorRows, runs: ConstantRuns, name: str) -> list[Finding]:
     if not a.y.size:
         words = f"{name} moves in no run: its friction is not known (NaN); add runs in which it moves"
         return [Finding("direction missing", np.zeros(0, dtype=int), words)]
-    forth = a.X[:, 0] > 0 if a.groups == (2,) else np.isin(np.arange(a.y.size), np.flatnonzero(a.X[:, 0] > 0))
-    sides = {0: 0 in a.groups, 1: 1 in a.groups}
-    if a.groups == (2,):
-        sides = {0: bool(np.any(forth)), 1: not np.all(forth)}
-    told = "is taken as that of the other" if a.groups == (2,) else "is not known (NaN)"
-    return [
-        Finding(
-            "direction missing",
-            runs.runs[a.rows],
-            f"{name} has no run {SIDES[side]}: friction in this direction {told}; add runs {SIDES[side]}",
-        )
-        for side, there in sides.items()
-        if not there
+    alike = a.groups == (2,)
+    there = (
+        (bool(np.any(a.X[:, 0] > 0)), not np.all(a.X[:, 0] > 0)) if alike else (0 in a.groups, 1 in a.groups)
+    )
+    told = "is taken as that of the other" if alike else "is not known (NaN)"
+    words = [
+        f"{name} has no run {side}: friction in this direction {told}; add runs {side}"
+        for side, known in zip(SIDES, there, strict=True)
+        if not known
     ]
+    return [Finding("direction missing", runs.runs[a.rows], each) for each in words]
 
 
 def _stribeck(a: ActuatorRows, runs: ConstantRuns, left: np.ndarray, name: str) -> list[Finding]:

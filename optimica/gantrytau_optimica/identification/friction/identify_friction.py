@@ -84,17 +84,10 @@ def _by_direction(
     actuators: Sequence[ActuatorRows], values: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Coulomb and viscous friction (n, 2), and names in the order of the covariance."""
-    coulomb, viscous, names = (
-        np.full((len(actuators), 2), np.nan),
-        np.full((len(actuators), 2), np.nan),
-        ["mass"],
-    )
+    found, names = {word: np.full((len(actuators), 2), np.nan) for word in ("coulomb", "viscous")}, ["mass"]
     for i, (a, c) in enumerate(zip(actuators, values, strict=True)):
-        for word, target, part in (
-            ("coulomb", coulomb, c[: c.size // 2]),
-            ("viscous", viscous, c[c.size // 2 :]),
-        ):
+        for (word, target), part in zip(found.items(), np.split(c, 2), strict=True):
             for group, value in zip(a.groups, part, strict=True):
                 target[i, slice(None) if group == 2 else group] = value
                 names.append(f"{word}[{i}]" if group == 2 else f"{word}[{i}][{group}]")
-    return coulomb, viscous, tuple(names)
+    return found["coulomb"], found["viscous"], tuple(names)

@@ -42,48 +42,36 @@ def _times(t: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
     step = np.diff(t[rows])
     back = rows[1:][step <= 0]
     if back.size:
-        repeat = agreeing(back, "repeat")
+        words = (
+            f"{rows_in_words(back)} {agreeing(back, 'repeat')} the time before or {agreeing(back, 'go')} back"
+        )
         yield Finding(
-            "time",
-            back,
-            f"{rows_in_words(back)} {repeat} the time before or {agreeing(back, 'go')} back; the log is parted there; sort "
-            "rows by time, and leave copies out",
+            "time", back, f"{words}; the log is parted there; sort rows by time, and leave copies out"
         )
     if not np.any(step > 0):
         return
     period = np.median(step[step > 0])
     after = rows[1:][(step > GAP * period) & (np.diff(rows) == 1)]
     if after.size:
-        longest = float(np.max(np.diff(t[rows])))
-        yield Finding(
-            "gaps",
-            after,
-            f"{rows_in_words(after)} {agreeing(after, 'follow')} a gap, up to {longest:.3g} s, of samples every "
-            f"{period:.3g} s; the log is parted there, as slopes across gaps would be wrong",
-        )
+        words = f"{rows_in_words(after)} {agreeing(after, 'follow')} a gap, up to {np.max(step):.3g} s, of samples every "
+        words += f"{period:.3g} s; the log is parted there, as slopes across gaps would be wrong"
+        yield Finding("gaps", after, words)
 
 
 def _lost(t: np.ndarray, q: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
     kept = np.flatnonzero(finite)
     rows = kept[lost_rows(t[kept], q[kept]) > 0]
     if rows.size:
-        it = "them" if len(rows) > 1 else "it"
-        yield Finding(
-            "lost rows",
-            rows,
-            f"positions go twice as far before {rows_in_words(rows)} as beside {it}, while times go on "
-            "evenly: rows are lost there, and all times behind are early; write down the time of each sample",
-        )
+        words = f"positions go twice as far before {rows_in_words(rows)} as beside {'them' if len(rows) > 1 else 'it'}, "
+        words += "while times go on evenly: rows are lost there, and all times behind are early; write down the time of each"
+        yield Finding("lost rows", rows, f"{words} sample")
 
 
 def _units(q: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
     spans = np.ptp(q[finite], axis=0) if finite.any() else np.zeros(q.shape[1])
     for k in np.flatnonzero(spans > LARGEST):
-        yield Finding(
-            "millimetres",
-            np.flatnonzero(finite),
-            f"q{k + 1} covers {spans[k]:.4g}, expected m or rad; write its unit in the header, 'q{k + 1} [mm]'",
-        )
+        words = f"q{k + 1} covers {spans[k]:.4g}, expected m or rad; write its unit in the header, 'q{k + 1} [mm]'"
+        yield Finding("millimetres", np.flatnonzero(finite), words)
 
 
 def _saturated(f: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
@@ -98,12 +86,11 @@ def _saturated(f: np.ndarray, finite: np.ndarray) -> Iterator[Finding]:
             longest = int(np.max(edges[1::2] - edges[::2]))
             if longest >= HELD and abs(limit) > 0.5 * np.max(np.abs(good)):
                 rows = np.flatnonzero(at)
-                yield Finding(
-                    "saturated force",
-                    rows,
-                    f"f{k + 1} stays at its {side} value {limit:.6g} in {rows_in_words(rows)}: a limit, where the force "
-                    "that was logged may not be the one that acted; leave these rows out, or move more slowly",
+                words = f"f{k + 1} stays at its {side} value {limit:.6g} in {rows_in_words(rows)}: a limit, where the force "
+                words += (
+                    "that was logged may not be the one that acted; leave these rows out, or move more slowly"
                 )
+                yield Finding("saturated force", rows, words)
 
 
 def _stretch(
@@ -129,12 +116,10 @@ def _motion(rows: np.ndarray, t: np.ndarray, q: np.ndarray, f: np.ndarray) -> It
     fastest = np.max(np.abs(v), axis=0)
     slow = np.flatnonzero(fastest < STILL)
     for k in slow:
-        yield Finding(
-            "slow",
-            rows,
-            f"q{k + 1} never moves faster than {fastest[k]:.3g}, expected more than {STILL:g} m/s or rad/s: friction has no "
-            "direction there; log a faster motion",
+        words = (
+            f"q{k + 1} never moves faster than {fastest[k]:.3g}, expected more than {STILL:g} m/s or rad/s"
         )
+        yield Finding("slow", rows, f"{words}: friction has no direction there; log a faster motion")
     moving = np.abs(v) > STILL
     stroke = np.ptp(q, axis=0)
     rms = np.sqrt(np.mean(v**2, axis=0))
@@ -142,11 +127,9 @@ def _motion(rows: np.ndarray, t: np.ndarray, q: np.ndarray, f: np.ndarray) -> It
     squares = np.array([np.mean(a[m, k] ** 2) if m.any() else 0.0 for k, m in enumerate(moving.T)])
     swing = np.sqrt(np.maximum(squares - 2 * noise**2, 0.0))
     if not slow.size and np.all(swing < STEADY * rms**2 / np.maximum(stroke, 1e-12)):
+        words = "all actuators move at constant speed: masses cannot be told from such a log, only friction and weight"
         yield Finding(
-            "constant velocity",
-            rows,
-            "all actuators move at constant speed: masses cannot be told from such a log, only friction and weight; add "
-            "motion that accelerates, or use identify_friction",
+            "constant velocity", rows, f"{words}; add motion that accelerates, or use identify_friction"
         )
         return
     if not slow.size:
@@ -172,17 +155,9 @@ def _forces(rows: np.ndarray, fits: PlainFits | None, period: float) -> Iterator
     if fits is None:
         return
     if fits.lag:
-        late = "late" if fits.lag > 0 else "early"
-        yield Finding(
-            "delay",
-            rows,
-            f"forces are {abs(fits.lag)} samples {late} ({abs(fits.lag) * period * 1e3:.3g} ms): that fits the motion best; "
-            f"shift the columns of f by {-fits.lag:+d} rows",
-        )
+        late, ms = "late" if fits.lag > 0 else "early", abs(fits.lag) * period * 1e3
+        words = f"forces are {abs(fits.lag)} samples {late} ({ms:.3g} ms): that fits the motion best"
+        yield Finding("delay", rows, f"{words}; shift the columns of f by {-fits.lag:+d} rows")
     if fits.reversed:
-        yield Finding(
-            "sign of force",
-            rows,
-            "forces take power out of the motion at all speeds, in all actuators: friction would drive the robot; change "
-            "the sign of f",
-        )
+        words = "forces take power out of the motion at all speeds, in all actuators: friction would drive the robot"
+        yield Finding("sign of force", rows, f"{words}; change the sign of f")

@@ -17,6 +17,7 @@ from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
 from gantrytau_optimica.identification.logs.lost_rows import lost_rows
+from gantrytau_optimica.identification.spectra.sampled_motion import rows_of
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +39,7 @@ class MotionLog(Record):
     def __post_init__(self):
         for name in ("t", "q", "f", "v", "r"):
             array = getattr(self, name)
-            object.__setattr__(self, name, None if array is None else _numbers(name, array))
+            object.__setattr__(self, name, None if array is None else rows_of("MotionLog", name, array))
         rows, actuators = len(self.t), self.q.shape[1]
         expected = {"t": (rows,), "q": (rows, actuators), "f": (rows, actuators), "v": (rows, actuators)}
         for name, shape in (expected | {"r": (rows, 3)}).items():
@@ -168,12 +169,8 @@ class MotionLog(Record):
         kept = np.flatnonzero(good)
         step = np.diff(self.t)
         broken = (step <= 0) | (step > GAP * np.median(step[step > 0])) if np.any(step > 0) else step <= 0
-        crossed = (
-            np.add.reduceat(np.append(broken, False), kept)[:-1] > 0
-            if kept.size > 1
-            else np.zeros(0, dtype=bool)
-        )
-        ends = np.flatnonzero(np.logical_or(np.diff(kept) > 1, crossed)) + 1
+        crossed = np.add.reduceat(np.append(broken, False), kept)[:-1] > 0 if kept.size > 1 else False
+        ends = np.flatnonzero((np.diff(kept) > 1) | crossed) + 1
         return tuple(self[rows] for rows in np.split(kept, ends) if rows.size)
 
 
@@ -211,24 +208,3 @@ def join(logs: Sequence[MotionLog]) -> MotionLog:
     kept = [name for name in ("v", "r") if all(getattr(log, name) is not None for log in logs)]
     arrays = {name: np.concatenate([getattr(log, name) for log in logs]) for name in ("q", "f", *kept)}
     return MotionLog(np.concatenate(times), **arrays)
-
-
-def _numbers(name: str, values: Any) -> np.ndarray:
-    try:
-        found = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ModelError(
-            f"MotionLog: found {name} that is no array of numbers ({error}), expected rows of numbers",
-            argument=name,
-        ) from None
-    if name == "t":
-        if found.ndim != 1:
-            raise ModelError(
-                f"MotionLog: found t of shape {found.shape}, expected (N,), times in s", argument=name
-            )
-    elif found.ndim == 1:
-        found = found[:, None]
-    elif found.ndim != 2:
-        raise ModelError(f"MotionLog: found {name} of shape {found.shape}, expected (N, n)", argument=name)
-    found.flags.writeable = False
-    return found

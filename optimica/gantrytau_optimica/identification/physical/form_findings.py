@@ -69,28 +69,20 @@ def _indefinite(form: MechanicalForm, direct: MechanicalForm) -> Iterator[tuple[
 
 
 def _apart(form: MechanicalForm, direct: MechanicalForm) -> Iterator[tuple[str, str]]:
-    changes = {
-        name: float(
-            np.linalg.norm(getattr(form, name) - getattr(direct, name)) / np.linalg.norm(getattr(form, name))
-        )
-        for name in ("M", "K")
-    }
+    pairs = {name: (getattr(form, name), getattr(direct, name)) for name in ("M", "K")}
+    changes = {name: float(np.linalg.norm(a - b) / np.linalg.norm(a)) for name, (a, b) in pairs.items()}
     if max(changes.values()) > APART:
         words = " and ".join(f"{name} by {change:.0%}" for name, change in changes.items())
-        yield (
-            "disagreement",
-            f"the direct route differs from the fit in {words}: neither is sure; look at `plot_bode` of both, and identify "
-            "a model from more data",
+        told = (
+            f"the direct route differs from the fit in {words}: neither is sure; look at `plot_bode` of both"
         )
+        yield "disagreement", f"{told}, and identify a model from more data"
 
 
 def _unexplained(missed: float) -> Iterator[tuple[str, str]]:
     if missed > MISSED:
-        yield (
-            "fit",
-            f"M, D and K leave {missed:.0%} of the motion, besides noise, expected {MISSED:.0%} at most: more modes, or "
-            "inputs are no forces along the outputs; give a position for each mode",
-        )
+        words = f"M, D and K leave {missed:.0%} of the motion, besides noise, expected {MISSED:.0%} at most: more modes, or "
+        yield "fit", f"{words}inputs are no forces along the outputs; give a position for each mode"
 
 
 def _aliased(system: LinearSystem, continuous: LinearSystem) -> Iterator[tuple[str, str]]:
@@ -98,8 +90,5 @@ def _aliased(system: LinearSystem, continuous: LinearSystem) -> Iterator[tuple[s
         return
     fastest, half = float(np.abs(np.imag(continuous.poles)).max() / (2 * np.pi)), 0.5 / system.period
     if fastest > ALIASED * half:
-        yield (
-            "aliased",
-            f"a mode of {fastest:.3g} Hz is near to half of the sampling frequency, {half:.3g} Hz, beyond which modes fold "
-            "back; sample more often",
-        )
+        words = f"a mode of {fastest:.3g} Hz is near to half of the sampling frequency, {half:.3g} Hz"
+        yield "aliased", f"{words}, beyond which modes fold back; sample more often"

@@ -49,7 +49,7 @@ def unbiased(
         return nothing
     M, g = _normal(rows, free, found.p)
     more = [
-        _normal(_with_noise(problem, parts, noise, seed, sign, rows[0].cutoff).rows(found.p), free, found.p)
+        _normal(_with_noise(problem, parts, noise, seed, sign).rows(found.p), free, found.p)
         for seed in range(PAIRS)
         for sign in (1.0, -1.0)
     ]
@@ -93,21 +93,14 @@ def _weight(problem: RigidRegression, noise: Sequence[np.ndarray]) -> float:
 
 
 def _with_noise(
-    problem: RigidRegression,
-    parts: Sequence[MotionLog],
-    noise: Sequence[np.ndarray],
-    seed: int,
-    sign: float,
-    cutoff: float,
+    problem: RigidRegression, parts: Sequence[MotionLog], noise: Sequence[np.ndarray], seed: int, sign: float
 ) -> RigidRegression:
-    draw = np.random.default_rng(seed)
-    return replace(
-        problem,
-        motions=[
-            filtered_motion(replace(part, q=part.q + sign * size * draw.normal(size=part.q.shape)), cutoff)
-            for part, size in zip(parts, noise, strict=True)
-        ],
-    )
+    draw, cutoff = np.random.default_rng(seed), problem.motions[0].cutoff
+    noisy = [
+        replace(part, q=part.q + sign * size * draw.normal(size=part.q.shape))
+        for part, size in zip(parts, noise, strict=True)
+    ]
+    return replace(problem, motions=[filtered_motion(part, cutoff) for part in noisy])
 
 
 def _normal(rows: Sequence[LogRows], free: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,14 +13,7 @@ from typing import Any
 
 import numpy as np
 
-PAIRS = (
-    (0, 0),
-    (1, 1),
-    (2, 2),
-    (1, 0),
-    (2, 0),
-    (2, 1),
-)  # of axes, one for each moment and product of inertia
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 0), (2, 0), (2, 1))  # of axes, one for each product of inertia
 
 
 @dataclass(frozen=True)

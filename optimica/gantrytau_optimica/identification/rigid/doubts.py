@@ -26,10 +26,7 @@ def second_looks(
     problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows], given: Mapping[str, Any]
 ) -> list[Finding]:
     """Kinds "delay", "law of friction", "fixed"; given: values that were fixed, by name."""
-    findings = [
-        *delay_findings(rows, found),
-        *law_findings(problem, found, rows),
-    ]
+    findings = [*delay_findings(rows, found), *law_findings(problem, found, rows)]
     return [*findings, *contradictions(problem, found, rows, given)] if given else findings
 
 
@@ -68,8 +65,8 @@ def law_findings(problem: RigidRegression, found: LimitedFit, rows: Sequence[Log
     free = found.base.independent
     changes = [
         [
-            m.filtered(m.thin((np.sign(m.speed) * np.exp(-((m.v / fall) ** 2)))[:, :, None]))[:, :, 0]
-            for fall in FALLS
+            m.filtered(m.thin((np.sign(m.speed) * np.exp(-((m.v / x) ** 2)))[:, :, None]))[:, :, 0]
+            for x in FALLS
         ]
         for m in problem.motions
     ]
@@ -83,14 +80,8 @@ def law_findings(problem: RigidRegression, found: LimitedFit, rows: Sequence[Log
             column = np.concatenate([c[k][r.moving[:, i], i] for c, r in zip(changes, rows, strict=True)])
             own = column - basis @ (basis.T @ column)
             if own @ own > 1e-6 * (column @ column) and left @ left > 0:
-                best = max(
-                    best,
-                    (
-                        float((own @ left) ** 2 / (own @ own) / (left @ left)),
-                        float(fall),
-                        float(own @ left / (own @ own)),
-                    ),
-                )
+                slope = float(own @ left / (own @ own))
+                best = max(best, (slope * float(own @ left / (left @ left)), float(fall), slope))
         explained, fall, size = best
         if explained > BENT:
             message = (
@@ -109,15 +100,9 @@ def contradictions(
     dynamics, friction = problem.dynamics, problem.friction
     own = tuple(n for n in given if friction is None or n not in friction.known)
     held = {model_name(dynamics.dae, n) for n in own}
-    freed = replace(
-        problem,
-        dynamics=replace(
-            dynamics,
-            names=(*dynamics.names, *own),
-            values={n: v for n, v in dynamics.values.items() if n not in held},
-        ),
-        friction=replace(friction, known={}) if friction else None,
-    )
+    others = {n: v for n, v in dynamics.values.items() if n not in held}
+    dynamics = replace(dynamics, names=(*dynamics.names, *own), values=others)
+    freed = replace(problem, dynamics=dynamics, friction=replace(friction, known={}) if friction else None)
     if freed.nonlinear():
         return []
     try:

@@ -37,10 +37,7 @@ def usable_parts(
         parts = mended.parts()
         long = [p for p in parts if len(p) > 1 and (p.t[-1] - p.t[0]) * cutoff >= PERIODS]
         firsts = [int(np.flatnonzero(mended.t == part.t[0])[0]) for part in long]
-        kept += [
-            ((number, rows[first : first + len(part)]), part)
-            for first, part in zip(firsts, long, strict=True)
-        ]
+        kept += [((number, rows[k : k + len(part)]), part) for k, part in zip(firsts, long, strict=True)]
         lost = len(mended) - sum(map(len, long))
         if lost:
             bad = np.flatnonzero(~log.finite)

@@ -43,9 +43,7 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
 FALLS = (0.01, 1.0)  # m/s between which a Stribeck speed is looked for
 CAUSES = ("delay", "law of friction", "fixed", "noise of positions")  # of what else is left
 SIGNS = ("not white", "outliers")  # told where no cause is
-INFLATED = (
-    10.0  # times the deviation that a parameter would have alone: errors of the model weigh as much more
-)
+INFLATED = 10.0  # times the deviation of a parameter alone: errors of the model weigh as much more
 
 
 def identify(
@@ -145,19 +143,11 @@ def _judged(
     rows: list[LogRows], problem: RigidRegression, limits: ParameterLimits
 ) -> tuple[float, list[Finding]]:
     """What a fit of the first half of each log leaves of the second."""
-    halves = [[r.part(s) for r in rows for s in (half(len(r.b)),)] for half in (_first, _second)]
+    halves = [[r.half(k) for r in rows] for k in (0, 1)]
     if not all(any(np.any(r.moving) for r in half) for half in halves):
         return np.nan, []
     first, second = map(factors_of, halves)
     return half_against_half((first, second), fit(first, problem.nominal, limits).p)
-
-
-def _first(count: int) -> slice:
-    return slice(0, count // 2)
-
-
-def _second(count: int) -> slice:
-    return slice(count // 2, count)
 
 
 def _identified(
@@ -194,10 +184,8 @@ def _identified(
             [r.thinned * np.nansum(e**2, axis=0) for r, e in zip(rows, left, strict=True)], axis=0
         ),
         condition=found.condition,
-        weak=tuple(
-            n for n, sure, held in zip(names, told, found.active, strict=True) if not sure and not held
-        ),
-        active=tuple(n for n, held in zip(names, found.active, strict=True) if held),
+        weak=tuple(np.array(names, dtype=object)[~told & ~found.active]),
+        active=tuple(np.array(names, dtype=object)[found.active]),
         base=found.base.words(names),
         nonlinear=(),
         stribeck_speed=friction.fall if friction and friction.law == "stribeck" else None,

@@ -6,7 +6,7 @@ Filtered samples taken as independent would promise deviations up to three times
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,9 +26,11 @@ class LogRows:
     cutoff: float
     thinned: int
 
-    def part(self, rows: slice) -> "LogRows":
-        """Some of the rows, one after another."""
-        return LogRows(self.A[rows], self.b[rows], self.moving[rows], self.period, self.cutoff, self.thinned)
+    def half(self, second: int) -> "LogRows":
+        """The first half of the rows, or the second."""
+        middle = len(self.b) // 2
+        rows = slice(middle, None) if second else slice(middle)
+        return replace(self, A=self.A[rows], b=self.b[rows], moving=self.moving[rows])
 
     def left(self, p: np.ndarray) -> np.ndarray:
         """What parameters leave of the forces, (N, n), zero where rows do not count."""

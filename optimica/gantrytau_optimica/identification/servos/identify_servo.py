@@ -11,11 +11,7 @@ from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRo
 from gantrytau_optimica.identification.servos.servo_model import ServoModel
 from gantrytau_optimica.identification.servos.step_response import StepResponse, check_steps
 
-TOLD = (
-    "duplicates",
-    "outliers",
-    "group",
-)  # friction and limits of servos colour what is left, and are told by themselves
+TOLD = ("duplicates", "outliers", "group")  # what friction and limits colour is told by themselves
 FOLLOWS = 30.0  # % of the motion, below which positions do not follow references
 
 
@@ -34,12 +30,13 @@ def identify_servo(steps: StepResponse | Sequence[StepResponse]) -> ServoModel:
     rows = [_rows(steps, i) for i in range(n)]
     fits = [fit_servo(one, period) for one in rows]
     share = np.array([explained(one, fit) for one, fit in zip(rows, fits, strict=True)])
-    rest = np.full((len(steps), n), np.nan)
-    matrix = np.zeros((2 * n, 2 * n))
+    rest, matrix = np.full((len(steps), n), np.nan), np.zeros((2 * n, 2 * n))
+    noticed = []
     for i, (one, fit) in enumerate(zip(rows, fits, strict=True)):
         _check_follows(i, share[i], fit)
         rest[[r.step for r in one], i] = fit.rest
         matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = fit.covariance
+        noticed += servo_findings(i, one, fit, period)
     left = _diagnostics(steps, rows, fits)
     return ServoModel(
         np.array([fit.delay for fit in fits]),
@@ -49,14 +46,7 @@ def identify_servo(steps: StepResponse | Sequence[StepResponse]) -> ServoModel:
         period,
         rest,
         steps,
-        (
-            *(
-                finding
-                for i, pair in enumerate(zip(rows, fits, strict=True))
-                for finding in servo_findings(i, *pair, period)
-            ),
-            *(f for f in left.findings if f.kind in TOLD),
-        ),
+        (*noticed, *(f for f in left.findings if f.kind in TOLD)),
         matrix,
         left,
     )

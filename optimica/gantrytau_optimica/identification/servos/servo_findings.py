@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gantrytau_optimica.fitting.finding import Finding, agreeing
+from gantrytau_optimica.fitting.robust import robust_deviation
 from gantrytau_optimica.identification.servos.servo_fit import ServoFit, ServoRows, fit_servo
 
 NOISY = 20.0  # deviations of noise that a step should have
@@ -41,29 +42,19 @@ def explained(rows: Sequence[ServoRows], fit: ServoFit) -> float:
 
 def _delay(fit: ServoFit) -> Told:
     if fit.delay == 0:
-        yield (
-            "delay",
-            None,
-            "positions follow their references within the same sample, which no servo does; look at the clocks of both",
-        )
+        words = "positions follow their references within the same sample, which no servo does"
+        yield "delay", None, f"{words}; look at the clocks of both"
     elif fit.delay == fit.latest:
-        yield (
-            "delay",
-            None,
-            f"the best delay is the longest looked at, {fit.latest} samples; log for longer, or take samples less often",
-        )
+        words = f"the best delay is the longest looked at, {fit.latest} samples"
+        yield "delay", None, f"{words}; log for longer, or take samples less often"
     # the squares of two laws differ by SURE^2 variances of a residual without colour
     clear = 1 + SURE**2 / _independent(fit.residuals)
-    others = [
-        d for d, squares in sorted(fit.left.items()) if d != fit.delay and squares <= clear * fit.squares
+    near = [
+        str(d) for d, squares in sorted(fit.left.items()) if d != fit.delay and squares <= clear * fit.squares
     ]
-    if others:
-        near = ", ".join(map(str, others))
-        yield (
-            "delay",
-            None,
-            f"a delay of {near} fits nearly as well as {fit.delay} samples; step farther or more often",
-        )
+    if near:
+        words = f"a delay of {', '.join(near)} fits nearly as well as {fit.delay} samples"
+        yield "delay", None, f"{words}; step farther or more often"
 
 
 def _gain(fit: ServoFit) -> Told:
@@ -73,11 +64,8 @@ def _gain(fit: ServoFit) -> Told:
     if static < 0:
         yield "sign", None, "it moves against its reference; change the sign of one of them"
     elif not 1 / UNIT < static < UNIT:
-        yield (
-            "unit",
-            None,
-            f"it comes to {static:.4g} times its reference, expected about 1; look at the units of both",
-        )
+        words = f"it comes to {static:.4g} times its reference, expected about 1"
+        yield "unit", None, f"{words}; look at the units of both"
 
 
 def _small(rows: Sequence[ServoRows], fit: ServoFit, period: float) -> Told:
@@ -89,30 +77,23 @@ def _small(rows: Sequence[ServoRows], fit: ServoFit, period: float) -> Told:
     sizes = np.array([np.ptp(r.u) for r in rows])
     small = np.flatnonzero(sizes < NOISY * noise)
     if small.size:
-        yield (
-            "noise",
-            small,
-            f"{_steps(rows, small)} of {_metres(sizes[small])} {agreeing(small, 'are')} small beside noise of {noise:.2g}; "
-            "step farther",
+        words = (
+            f"{_steps(rows, small)} of {_metres(sizes[small])} {agreeing(small, 'are')} small beside noise"
         )
+        yield "noise", small, f"{words} of {noise:.2g}; step farther"
     constant = -1 / np.log(fit.pole) if fit.pole > 0 else 0.0
     left = np.array([len(r.u) - 1 - int(np.argmax(r.u != 0)) - fit.delay for r in rows])
     short = np.flatnonzero(left < SETTLED * constant)
     if short.size:
         seconds = SETTLED * constant * period
-        yield (
-            "not settled",
-            short,
-            f"{_steps(rows, short)} {agreeing(short, 'end')} before the motion does; log for {seconds:.2g} s from the step "
-            "on",
-        )
+        words = f"{_steps(rows, short)} {agreeing(short, 'end')} before the motion does"
+        yield "not settled", short, f"{words}; log for {seconds:.2g} s from the step on"
     moving = np.flatnonzero([_moves(r, noise) for r in rows])
     if moving.size:
-        yield (
-            "not at rest",
-            moving,
-            f"it moves before {_steps(rows, moving)} {agreeing(moving, 'begin')}, which counts as response; wait for longer",
+        words = (
+            f"it moves before {_steps(rows, moving)} {agreeing(moving, 'begin')}, which counts as response"
         )
+        yield "not at rest", moving, f"{words}; wait for longer"
 
 
 def _amplitudes(rows: Sequence[ServoRows], period: float) -> Told:
@@ -122,11 +103,8 @@ def _amplitudes(rows: Sequence[ServoRows], period: float) -> Told:
     ends = np.flatnonzero(np.diff(sizes) > ALIKE * sizes[:-1]) + 1
     groups = np.split(np.array(order), ends)
     if len(groups) < 2:
-        yield (
-            "one size",
-            None,
-            f"all steps are of {_metres(sizes[:1])}; friction and saturation only show in steps of several sizes",
-        )
+        words = f"all steps are of {_metres(sizes[:1])}"
+        yield "one size", None, f"{words}; friction and saturation only show in steps of several sizes"
         return
     small, large = (fit_servo([rows[k] for k in groups[g]], period) for g in (0, -1))
     if not (0 < small.pole < 1 and 0 < large.pole < 1):
@@ -169,7 +147,7 @@ def _independent(residuals: Sequence[np.ndarray]) -> float:
 
 def _noise(y: np.ndarray) -> float:
     """Deviation of white noise by second differences, whose variance is six times as large."""
-    return float(np.median(np.abs(np.diff(y, 2))) / 0.6745 / np.sqrt(6)) if len(y) > 2 else 0.0
+    return robust_deviation(np.diff(y, 2)) / np.sqrt(6) if len(y) > 2 else 0.0
 
 
 def _moves(r: ServoRows, noise: float) -> bool:

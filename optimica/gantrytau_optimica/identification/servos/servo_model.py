@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau import ModelError
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.named_covariance import named_covariance
 from gantrytau_optimica.identification.servos.figures import draw_steps
 from gantrytau_optimica.identification.servos.servo_fit import corner, response
 from gantrytau_optimica.identification.servos.step_response import StepResponse
@@ -51,15 +51,7 @@ class ServoModel(Record):
         By the spectrum of what is left, which friction colours: as noise that is white it would seem far too small.
         Raises ModelError for other names.
         """
-        wanted = list(self.names if names is None else names)
-        strange = [name for name in wanted if name not in self.names]
-        if strange:
-            raise ModelError(
-                f"ServoModel.covariance: found {strange[0]!r}, expected names among {', '.join(self.names)}",
-                argument="names",
-            )
-        rows = [self.names.index(name) for name in wanted]
-        return self.matrix[np.ix_(rows, rows)]
+        return named_covariance("ServoModel", self.names, self.matrix, names)
 
     @property
     def deviations(self) -> dict[str, float]:

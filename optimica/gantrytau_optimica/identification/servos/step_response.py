@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.finding import rows_in_words
+from gantrytau_optimica.identification.spectra.sampled_motion import rows_of
 
 EVEN = 0.01  # of the period, by which times of samples may be off
 LEAST = 8  # samples from the first change of a reference on, which two parameters and a delay need
@@ -121,29 +122,15 @@ def _check_actuator(i: int, steps: Sequence[StepResponse]) -> None:
 
 
 def _numbers(name: str, values: Any) -> np.ndarray:
-    try:
-        found = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
+    found = rows_of("StepResponse", name, values)
+    bad = np.flatnonzero(~np.isfinite(np.atleast_2d(found.T)).all(axis=0))
+    if bad.size or not found.size:
+        where = f"that is not finite in {rows_in_words(bad)}" if bad.size else f"of shape {found.shape}"
         raise ModelError(
-            f"StepResponse: found {name} that is no array of numbers ({error}), expected rows of numbers",
-            argument=name,
-        ) from None
-    if name == "t" and found.ndim != 1:
-        raise ModelError(
-            f"StepResponse: found t of shape {found.shape}, expected (N,), times in s", argument=name
-        )
-    if name != "t" and found.ndim == 1:
-        found = found[:, None]
-    if found.ndim > 2 or not found.size:
-        raise ModelError(f"StepResponse: found {name} of shape {found.shape}, expected (N, n)", argument=name)
-    bad = np.flatnonzero(~np.isfinite(found.reshape(len(found), -1)).all(axis=1))
-    if bad.size:
-        raise ModelError(
-            f"StepResponse: found {name} that is not finite in {rows_in_words(bad)}, expected numbers in every row, as a "
-            "response depends on all rows before; cut the log there, or repair it",
+            f"StepResponse: found {name} {where}, expected numbers in every row, as a response depends on all rows before; "
+            "cut the log there, or repair it",
             argument=name,
         )
-    found.flags.writeable = False
     return found
 
 

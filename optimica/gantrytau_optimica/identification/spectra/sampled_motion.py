@@ -1,4 +1,4 @@
-"""Inputs and outputs that were sampled together, checked."""
+"""What was measured, checked: rows of numbers, and inputs with outputs that were sampled together."""
 
 from typing import Any
 
@@ -31,16 +31,28 @@ def sampled_motion(
     return u, y
 
 
-def _samples(place: str, letter: str, values: Any, columns: int | None) -> np.ndarray:
+def rows_of(place: str, name: str, values: Any) -> np.ndarray:
+    """Numbers that cannot be written to: times t (N,), else rows (N, n), of which (N,) is one column. Raises ModelError."""
     try:
         found = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(f"{place}: found {letter} that is no array of numbers", argument=letter) from None
-    found = found[:, None] if found.ndim == 1 else found
-    if found.ndim != 2 or not found.shape[1] or columns not in (None, found.shape[1]):
-        width = "n" if columns is None else columns
+    except (TypeError, ValueError) as error:
         raise ModelError(
-            f"{place}: found {letter} of shape {found.shape}, expected (N, {width}): one row for each sample",
+            f"{place}: found {name} that is no array of numbers ({error}), expected rows of numbers",
+            argument=name,
+        ) from None
+    found = found[:, None] if found.ndim == 1 and name != "t" else found
+    shape, wanted = found.shape, "(N,), times in s" if name == "t" else "(N, n), a row for each sample"
+    if found.ndim != (1 if name == "t" else 2):
+        raise ModelError(f"{place}: found {name} of shape {shape}, expected {wanted}", argument=name)
+    found.flags.writeable = False
+    return found
+
+
+def _samples(place: str, letter: str, values: Any, columns: int | None) -> np.ndarray:
+    found = rows_of(place, letter, values)
+    if columns not in (None, found.shape[1]):
+        raise ModelError(
+            f"{place}: found {letter} of shape {found.shape}, expected (N, {columns}): one row for each sample",
             argument=letter,
         )
     bad = np.flatnonzero(~np.isfinite(found).all(axis=1))

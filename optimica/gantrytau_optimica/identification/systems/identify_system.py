@@ -20,9 +20,7 @@ from gantrytau_optimica.identification.systems.subspace import SharedSpace, shar
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHIFTED = (
-    1.25  # times: rows that repeat each other, shifted, agree by chance as much more (1.2 in sixty trials)
-)
+SHIFTED = 1.25  # times: rows that repeat each other, shifted, agree by chance as much more (1.2 in 60 trials)
 GROWN = 1e6  # times, by which a free motion may grow over the samples
 NONE = np.zeros(0, dtype=int)
 
@@ -134,16 +132,10 @@ def identify_system(
 
 def _diagnostics(y: np.ndarray, simulated: np.ndarray, period: float) -> Diagnostics:
     """What is left of each output, simulated with its inputs."""
+    time = {"time": period * np.arange(len(y))}
+    columns = enumerate(zip(y.T, simulated.T, strict=True))
     return diagnose(
-        [
-            ResidualSeries(
-                f"output {i}",
-                (y - simulated)[:, i],
-                measured=y[:, i] - np.mean(y[:, i]),
-                signals={"time": period * np.arange(len(y))},
-            )
-            for i in range(y.shape[1])
-        ]
+        [ResidualSeries(f"output {i}", a - b, measured=a - np.mean(a), signals=time) for i, (a, b) in columns]
     )
 
 
@@ -191,23 +183,11 @@ def _of_noise(samples: int, inputs: int, outputs: int, rows: int) -> float:
 
 
 def _findings(space: SharedSpace, order: int, noise: float, radius: float) -> list[Finding]:
-    found = []
-    told = int(np.sum(space.correlations > noise))
+    found, told = [], int(np.sum(space.correlations > noise))
     if order > told:
-        found.append(
-            Finding(
-                "order",
-                NONE,
-                f"past and future share {told} directions more than noise would, of {order}: the rest of the order follows "
-                f"noise; take order={told}, or measure for longer",
-            )
-        )
+        words = f"past and future share {told} directions more than noise would, of {order}: the rest of the order follows "
+        found.append(Finding("order", NONE, f"{words}noise; take order={told}, or measure for longer"))
     if radius > 1:
-        found.append(
-            Finding(
-                "unstable",
-                NONE,
-                f"a pole with |z| = {radius:.6g} grows: a drift, or an order that is too high",
-            )
-        )
+        words = f"a pole with |z| = {radius:.6g} grows: a drift, or an order that is too high"
+        found.append(Finding("unstable", NONE, words))
     return found

@@ -1,7 +1,5 @@
 """Systems that the same data allow, of another order or without a drift, beside the one that was asked for."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from gantrytau_optimica.fitting.finding import Finding
@@ -23,35 +21,30 @@ def system_of(space: SharedSpace, order: int, u: np.ndarray, y: np.ndarray) -> M
 
 def others_explain_more(
     system: Matrices, space: SharedSpace, noise: float, u: np.ndarray, y: np.ndarray, block_rows: int
-) -> Iterator[Finding]:
+) -> list[Finding]:
     """Kinds "drift" and "order": outputs without their straight lines, and the order at which noise begins."""
-    order, none = len(system[0]), np.zeros(0, dtype=int)
+    order = len(system[0])
     t = np.linspace(-1.0, 1.0, len(u))[:, None]
     slope = np.sum(t * y, axis=0) / np.sum(t * t)
     level = y - t * slope
     drifts = float(np.sum((t * slope) ** 2)) > LINE * _left(system, u, y)
-    steady = shared_space(u, level, block_rows) if drifts else None
-    if steady is not None and len(steady.correlations) >= order:
-        before, after = _left(system, u, level), _left(system_of(steady, order, u, level), u, level)
-        if after < HALF * before:
-            yield Finding(
-                "drift",
-                none,
-                f"outputs drift by up to {2 * np.max(np.abs(slope)):.3g} of their deviations over the samples: without "
-                f"these lines a system of order {order} explains {_share(after, level)} of them, and this one "
-                f"{_share(before, level)}; take straight lines out of the outputs, or measure them without drift",
-            )
-            return
     told = min(int(np.sum(space.correlations > noise)), (block_rows - 1) * y.shape[1])
-    if told > order:
-        before, after = _left(system, u, y), _left(system_of(space, told, u, y), u, y)
+    trials = [("drift", shared_space(u, level, block_rows), order, level)] if drifts else []
+    for kind, other, n, values in [*trials, ("order", space, told, y)]:
+        if len(other.correlations) < n or (kind == "order" and told <= order):
+            continue
+        before, after = _left(system, u, values), _left(system_of(other, n, u, values), u, values)
         if after < HALF * before:
-            yield Finding(
-                "order",
-                none,
-                f"a system of order {told} explains {_share(after, y)} of the outputs, this one of order {order} "
-                f"{_share(before, y)}; take a higher order: look at plot_singular_values()",
-            )
+            by, to = _share(after, values), _share(before, values)
+            words = {
+                "drift": f"outputs drift by up to {2 * np.max(np.abs(slope)):.3g} of their deviations over the samples: "
+                f"without these lines a system of order {n} explains {by} of them, and this one {to}; take straight lines "
+                "out of the outputs, or measure them without drift",
+                "order": f"a system of order {n} explains {by} of the outputs, this one of order {order} {to}; take a "
+                "higher order: look at plot_singular_values()",
+            }
+            return [Finding(kind, np.zeros(0, dtype=int), words[kind])]
+    return []
 
 
 def _left(system: Matrices, u: np.ndarray, y: np.ndarray) -> float:

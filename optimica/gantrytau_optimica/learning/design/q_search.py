@@ -20,7 +20,7 @@ BACK = 0.999  # of the cut-off, by which filters are closed at least in each ste
 HELD, BELOW = (
     5,
     0.999,
-)  # times that the penalty is moved inside; times the margin, which is enough: what is between frequencies
+)  # times that the penalty is moved inside; times the margin, for what is between frequencies
 CLOSED = 300  # such steps at most
 
 

@@ -22,13 +22,10 @@ def not_as_foretold(u: np.ndarray, stability: Stability, first: int) -> tuple[Fi
     if not rows.size:
         return ()
     k = int(rows[-1])
-    return (
-        Finding(
-            "foretold",
-            first + 1 + rows,
-            f"run {first + 1 + k} left {kept[k]:.2f} of its corrections to the next, {left[k]:.0%} of them otherwise than "
-            f"the response foretells (at most {stability.sigma:.2f} in all): it is the response of another plant, forces or "
-            "speeds are at a limit, or runs do not repeat themselves; measure the response again (response=None), look at "
-            "the forces, or take `repeat`",
-        ),
+    words = (
+        f"run {first + 1 + k} left {kept[k]:.2f} of its corrections to the next, {left[k]:.0%} of them otherwise than the "
+        f"response foretells (at most {stability.sigma:.2f} in all): it is the response of another plant, forces or speeds "
+        "are at a limit, or runs do not repeat themselves; measure the response again (response=None), look at the forces, "
+        "or take `repeat`"
     )
+    return (Finding("foretold", first + 1 + rows, words),)

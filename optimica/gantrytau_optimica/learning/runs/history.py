@@ -150,13 +150,8 @@ class History(Record):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all runs to a file (.npz), from which `learn(..., history=)` goes on; it appears whole."""
         path = _npz(path)
-        about = dict(
-            format=FORMAT,
-            joints=self.joints,
-            names=self.names,
-            columns=self.columns,
-            settings=self.settings,
-        )
+        about = {name: getattr(self, name) for name in ("joints", "names", "columns", "settings")}
+        about["format"] = FORMAT
         arrays = {name: getattr(self, name) for name in (*ROWS, "wanted", "full", "next_input")}
         with replacing(path) as partial, partial.open("wb") as file:
             np.savez_compressed(

@@ -18,10 +18,7 @@ WIDEST, NARROWEST = 0.38, 3.0  # half a profile: of an edge; pixels
 STEP = 0.5  # pixels, between samples of a profile
 ENOUGH_PROFILES, ENOUGH_EDGES = 6, 18
 STRAY = 3.0  # standard deviations of a profile from its line
-WEAK, UNEVEN = (
-    0.4,
-    0.12,
-)  # of the usual contrast: a profile at least; how far an edge may be from it, besides noise
+WEAK, UNEVEN = 0.4, 0.12  # of the usual contrast: a profile at least; what an edge may be off, besides noise
 BENT, APART = 0.5, 1.5  # pixels: scatter about a line besides noise; a corner from the projective map of all
 VISIBLE = 1.5  # contrast over noise
 ROUNDS = 3

@@ -9,19 +9,15 @@ from gantrytau import GantryTauError
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.opencv import VisionError
-from gantrytau_optimica.vision.reconstruction.adjustment import adjusted, started
+from gantrytau_optimica.vision.reconstruction.adjustment import LEAST_SIGMA, adjusted, started
 from gantrytau_optimica.vision.reconstruction.bundle import PRIOR, Bundle, State
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
 Array = np.ndarray
 OFF = 0.1  # of distances along the guideways, by which places may miss them before lenses are known
 ANOTHER_SIZE = 1.25  # times the side of the pattern, beyond which spacing and side contradict each other
-SIZE_TOLD = (
-    0.01  # of the side of the pattern, by which spacing says it is another, from which on that is told
-)
-CONTRADICTED = (
-    0.05  # of the side, by which spacing says it is another, from which on spacing is believed alone
-)
+SIZE_TOLD = 0.01  # of the side of the pattern, by which spacing must say it is another to be told
+CONTRADICTED = 0.05  # of the side, by which spacing must say it is another to be believed alone
 LARGE = 0.3  # pixel, of what is left of image points, above which reasons are looked for
 REFUSED, NOISY = 1.0, 3.0  # pixel, and deviations of a corner, above which images do not belong together
 CLEARLY = 0.93  # of what is left, below which what is held is better let go: noise gains 2 % by it
@@ -64,13 +60,10 @@ def check_left(bundle: Bundle, state: State, sigma: float) -> None:
     if left <= expected:
         return
     trials = [*_freed(bundle, state), *_exchanged(bundle)]
-    reasons = [words for words, other in trials if other < BETTER * left]
+    reasons = "; ".join(words for words, other in trials if other < BETTER * left)
     raise VisionError(
         f"reconstruct: image points miss by {left:.3g} pixel in the median, expected below {expected:.2g}; "
-        + (
-            "; ".join(reasons)
-            or "check the lenses, the side, and that images of all cameras are of the same poses"
-        )
+        f"{reasons or 'check the lenses, the side, and that images of all cameras are of the same poses'}"
     )
 
 
@@ -84,24 +77,20 @@ def suspected(
         more = "; lengths are those of spacing" if abs(size - 1) > CONTRADICTED else ""
         found.append(Finding("size", rows, words + more))
     left = left_over(bundle, state)
-    for words, other in _freed(bundle, state):
-        if other < CLEARLY * left:
-            found.append(
-                Finding("images", rows, f"image points miss by {left:.3g} pixel in the median; {words}")
-            )
-    for words, other in _exchanged(bundle) if left > LARGE else ():
-        if other < BETTER * left:
-            found.append(
-                Finding("images", rows, f"image points miss by {left:.3g} pixel in the median; {words}")
-            )
+    trials = [(CLEARLY, *trial) for trial in _freed(bundle, state)] if left > LEAST_SIGMA else []
+    trials += [(BETTER, *trial) for trial in _exchanged(bundle)] if left > LARGE else []
+    missed = f"image points miss by {left:.3g} pixel in the median"
+    found += [
+        Finding("images", rows, f"{missed}; {words}")
+        for share, words, other in trials
+        if other < share * left
+    ]
     for c, deviations in enumerate(lens_deviations):
         known = deviations[: len(NUMBERS)] / PRIOR[: len(NUMBERS)]
         vague = [name for name, part in zip(NUMBERS, known, strict=True) if part > LEARNT]
         if vague:
-            words = f"camera {c + 1}: images tell {', '.join(vague)} hardly better than was assumed of what is given"
-            found.append(
-                Finding("lens", rows, f"{words}; take poses all over the image, or intrinsics='fixed'")
-            )
+            words = f"camera {c + 1}: images tell {', '.join(vague)} hardly better than was assumed of what is given; take "
+            found.append(Finding("lens", rows, f"{words}poses all over the image, or intrinsics='fixed'"))
     return found
 
 
@@ -114,10 +103,8 @@ def _freed(bundle: Bundle, state: State) -> Iterator[tuple[str, float]]:
         _, bent, _, _ = adjusted(estimated, state)
         left = left_over(estimated, bent)
         k1 = ", ".join(f"{camera.distortion[0]:.3f}" for camera in bent.cameras)
-        yield (
-            f"with k1 {k1} they would by {left:.3g}: lenses are not those given; intrinsics='estimate' finds them",
-            left,
-        )
+        words = f"with k1 {k1} they would by {left:.3g}: lenses are not those given"
+        yield f"{words}; intrinsics='estimate' finds them", left
 
 
 def _exchanged(bundle: Bundle) -> Iterator[tuple[str, float]]:

@@ -7,11 +7,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.adjustment import Located, adjusted, places, scaled_by, started
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
+from gantrytau_optimica.vision.reconstruction.image_diagnostics import image_diagnostics, image_findings
 from gantrytau_optimica.vision.reconstruction.image_mistakes import (
     CONTRADICTED,
     LARGE,
@@ -92,10 +94,10 @@ def reconstruct(
     poses = left_by_poses(bundle, state)
     beyond = poses.beyond(1 / float(bundle.weights.max()))
     placed = replace(placed, covariance=beyond * placed.covariance, shared=np.sqrt(beyond) * placed.shared)
-    found = _of_all_poses(bundle, state, placed, rows, detections)
+    left = image_diagnostics(poses, bundle.pixels, detections.sigma[:, rows], rows)
+    found = _of_all_poses(bundle, state, placed, rows, detections, left)
     noticed += suspected(bundle, state, placed.scale, rows, placed.lens_deviations)
-    if not any(each.kind == "images" for each in noticed):
-        noticed += other_moments(poses, rows)
+    noticed += image_findings(left, noticed, other_moments(poses, rows))
     seconds = time.perf_counter() - begin
     return replace(found, steps=steps, seconds=seconds, findings=(*detections.findings, *noticed))
 
@@ -128,20 +130,19 @@ def _begun(bundle: Bundle) -> tuple[Bundle, State, BlockRows, int]:
 
 
 def _of_all_poses(
-    bundle: Bundle, state: State, placed: Located, rows: Array, detections: Detections
+    bundle: Bundle, state: State, placed: Located, rows: Array, detections: Detections, left: Diagnostics
 ) -> Reconstruction:
-    cameras, count = detections.found.shape
-    points = detections.corners.shape[2]
-    r, covariance = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
-    R, residuals = np.full((count, 3, 3), np.nan), np.full((cameras, count, points, 2), np.nan)
-    shared = np.full((count, *placed.shared.shape[1:]), np.nan)
-    r[rows], covariance[rows], shared[rows], R[rows] = placed.r, placed.covariance, placed.shared, state.R
-    residuals[:, rows] = bundle.residuals(state)
+    def of_all(found: Array) -> Array:
+        whole = np.full((len(detections.numbers), *found.shape[1:]), np.nan)
+        whole[rows] = found
+        return whole
+
+    residuals = np.swapaxes(of_all(np.swapaxes(bundle.residuals(state), 0, 1)), 0, 1)
     return Reconstruction(
-        r=r,
-        R=R,
-        covariance=covariance,
-        shared=shared,
+        r=of_all(placed.r),
+        R=of_all(state.R),
+        covariance=of_all(placed.covariance),
+        shared=of_all(placed.shared),
         cameras=state.cameras,
         rms=float(np.sqrt(np.nanmean(residuals**2))),
         residuals=residuals,
@@ -149,4 +150,5 @@ def _of_all_poses(
         lens_deviations=placed.lens_deviations,
         turning=not bundle.told.alike,
         numbers=detections.numbers,
+        diagnostics=left,
     )

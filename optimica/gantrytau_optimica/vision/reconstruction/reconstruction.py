@@ -10,6 +10,7 @@ from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.scenes.scene import AHEAD
@@ -27,7 +28,8 @@ class Reconstruction(Record):
     left of image points, in pixels; residuals: (C, N, P, 2) in pixels; scale: the size of the pattern as a multiple of what
     its side says, where spacing tells lengths; lens_deviations: (C, 5) standard deviations of ln focal length, centre in
     pixels, k1, k2, zero where lenses are given; turning: whether orientations differ from pose to pose; seconds: of the
-    adjustment; steps: how many; findings: what was noticed, rows from 0.
+    adjustment; steps: how many; findings: what was noticed, rows from 0;
+    diagnostics: what is left of image points.
     """
 
     r: Array = field(repr=False)
@@ -41,6 +43,7 @@ class Reconstruction(Record):
     lens_deviations: Array = field(repr=False)
     turning: bool
     numbers: Array = field(repr=False)
+    diagnostics: Diagnostics = field(repr=False)
     steps: int = 0
     seconds: float = 0.0
     findings: tuple[Finding, ...] = ()

@@ -30,10 +30,8 @@ def check_images(detections: Detections, cameras: Sequence[Camera]) -> tuple[Cam
     lenses = (cameras,) if isinstance(cameras, Camera) else tuple(cameras)
     wrong = next((each for each in lenses if not isinstance(each, Camera)), None)
     if wrong is not None:
-        raise VisionError(
-            f"reconstruct: found {type(wrong).__name__} among cameras, expected Camera of vision, "
-            "the lens alone"
-        )
+        words = f"found {type(wrong).__name__} among cameras, expected Camera of vision, the lens alone"
+        raise VisionError(f"reconstruct: {words}")
     if len(lenses) != len(detections.size):
         raise VisionError(
             f"reconstruct: found {len(lenses)} cameras and images of {len(detections.size)}, expected one lens for each"
@@ -51,14 +49,10 @@ def check_words(
     intrinsics: str, scale: str | None, spacing: Any, orientation: str, corners: str, count: int
 ) -> str:
     """What tells the scale; VisionError for unknown words and for words that contradict each other."""
-    scale = (
-        ("pattern" if spacing is None else "both" if corners == "plate" else "spacing")
-        if scale is None
-        else scale
-    )
-    for name, value in dict(
-        intrinsics=intrinsics, scale=scale, orientation=orientation, corners=corners
-    ).items():
+    if scale is None:
+        scale = "pattern" if spacing is None else "both" if corners == "plate" else "spacing"
+    asked = dict(intrinsics=intrinsics, scale=scale, orientation=orientation, corners=corners)
+    for name, value in asked.items():
         if value not in KNOWN[name]:
             listed = ", ".join(map(repr, KNOWN[name]))
             raise VisionError(
@@ -74,19 +68,15 @@ def check_words(
             "reconstruct: found spacing and scale='pattern', which leaves it out; take scale='both'"
         )
     if corners == "free":
-        refused = None
-        if scale == "both":
-            refused = (
-                "scale='both', expected 'spacing' or 'pattern': free corners are scaled once, at the end"
-            )
-        elif intrinsics == "estimate":
-            refused = (
-                "intrinsics='estimate', expected 'fixed': without the plate images do not tell the lenses"
-            )
-        elif count < 2:
-            refused = "one camera, expected two or more: depth of a single corner is not seen by one"
-        if refused:
-            raise VisionError(f"reconstruct: with corners='free' found {refused}; corners='plate' allows it")
+        refusals = {
+            "scale='both', expected 'spacing' or 'pattern': free corners are scaled once, at the end": scale
+            == "both",
+            "intrinsics='estimate', expected 'fixed': without the plate images do not tell the lenses": intrinsics
+            != "fixed",
+            "one camera, expected two or more: depth of a single corner is not seen by one": count < 2,
+        }
+        for words in (words for words, there in refusals.items() if there):
+            raise VisionError(f"reconstruct: with corners='free' found {words}; corners='plate' allows it")
     return scale
 
 
@@ -114,9 +104,7 @@ def usable_poses(detections: Detections) -> np.ndarray:
     rows = np.flatnonzero(detections.found.sum(axis=0) >= needed)
     if len(rows) < LEAST_POSES:
         steps = Counter(step for step in detections.steps.ravel().tolist() if step)
-        where = {
-            step: rows_in_words(np.flatnonzero((detections.steps == step).any(axis=0))) for step in steps
-        }
+        where = {s: rows_in_words(np.flatnonzero((detections.steps == s).any(axis=0))) for s in steps}
         words = [f"{n} images at {step!r}, {where[step]}: {LOST[step]}" for step, n in steps.most_common()]
         lost = "; ".join(words) if words else "no image was lost"
         raise VisionError(

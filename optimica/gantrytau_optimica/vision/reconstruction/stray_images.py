@@ -14,6 +14,7 @@ import numpy as np
 from gantrytau.kinematics.rotations import mean_rotation
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.fitting.robust import NORMAL, OUTLIER
+from gantrytau_optimica.vision.reconstruction.adjustment import LEAST_SIGMA
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State
 from gantrytau_optimica.vision.reconstruction.relative_orientation import extents, plates
 
@@ -23,7 +24,6 @@ SETTLED = 8  # steps of Gauss-Newton of a pose
 CLEAR = 25.0  # variances, by which one camera explains a pose better than the next: five deviations
 SHAPE = 2.0  # times the scatter of other images, from which on a shape is wrong
 STRONG = 0.5  # of its corners: shifts that motion of the pose hardly explains
-LEAST_SIGMA = 1e-3  # pixel; images do not tell more
 SURE = 5.0  # deviations, from which on offsets are no chance
 ALIKE = 2.0  # times, from which on they are told
 CHI_2 = 1.177  # median of the root of a chi-square of two
@@ -31,9 +31,13 @@ CHI_2 = 1.177  # median of the root of a chi-square of two
 
 @dataclass(frozen=True, eq=False)
 class PoseFit:
-    """Of N poses: amounts of their shifts in deviations and sizes of their shapes beside others, (N,); sigma: of a corner in
-    pixels, without what all corners of an image share; shared: how many times as large the offsets of images are as corners
-    that err alone would make them; unsure: deviation of that number.
+    """What the images of N poses leave.
+
+    shifts, shapes: amounts of shifts in deviations, and sizes of shapes beside others, (N,); sigma: of a corner in pixels,
+    without what all corners of an image share; shared: offsets of images beside those of corners that err alone, a ratio;
+    unsure: its deviation; left: residuals by their own deviations, that of a corner being 1, (C, N, P, 2) in pixels, NaN
+    where not seen; along: residuals along a shift of each image, across and down (2 C, N); reach: slope of these by the
+    shift; slopes: by the shared unknowns, (2 C, N, S).
     """
 
     shifts: Array
@@ -41,6 +45,10 @@ class PoseFit:
     sigma: float
     shared: float
     unsure: float
+    left: Array
+    along: Array
+    reach: Array
+    slopes: Array
 
     def beyond(self, sigma: float) -> float:
         """By how much the covariance of poses is larger than that of corners of deviation `sigma` that err alone."""
@@ -79,7 +87,23 @@ def left_by_poses(bundle: Bundle, state: State) -> PoseFit:
     offsets = np.sqrt(np.sum(parts * strong, axis=1) / np.maximum(strong.sum(axis=1), 1)) / sigma
     number = max(int(strong.sum()), 1)
     shared = float(np.sqrt(np.sum(parts * strong) / number)) / sigma if offsets.any() else 1.0
-    return PoseFit(shifts, shapes / sigma, sigma, shared, float(np.sqrt(0.5 / number)))
+    reach = np.sqrt(np.maximum(np.einsum("nkk->nk", squares), 1e-300))
+    slopes = np.swapaxes(apart, 1, 2) @ rows.by_shared / reach[..., None]
+    alone = 1.0 - np.einsum("nij,nji->ni", A, own)
+    each = np.where(
+        (mask.reshape(e.shape) > 0) & (alone > 1e-9), left / np.sqrt(np.maximum(alone, 1e-9)), np.nan
+    )
+    return PoseFit(
+        shifts,
+        shapes / sigma,
+        sigma,
+        shared,
+        float(np.sqrt(0.5 / number)),
+        each.reshape(mask.shape).transpose(2, 0, 1, 3),
+        (along / reach).T,
+        reach.T,
+        np.moveaxis(slopes, 1, 0),
+    )
 
 
 def stray_images(bundle: Bundle, state: State) -> list[tuple[int, tuple[int, ...]]]:
