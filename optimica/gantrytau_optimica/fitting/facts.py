@@ -22,9 +22,9 @@ WORDS = {  # kind -> what was found
     "noise smaller": "what is left of {quantity} is only {size:.3g} times the noise that was told (probability "
     "{probability:.2g})",
     "not white": "neighbours of what is left of {quantity} correlate by {size:+.2f}, those of noise by less than {held:.2f}",
-    "outliers": "{rows} of {quantity} are off by up to {size:.3g} robust deviations of the others",
+    "outliers": "what is left of {quantity} in {rows} is off by up to {size:.3g} robust deviations of the others",
     "group": "{cause} leaves {size:.3g} times as much as the others",
-    "trend": "what is left of {quantity} follows {cause}, by {size:.4g} of its unit: {share:.0%} of it, {deviations:.0f} "
+    "trend": "what is left of {quantity} follows {cause}, by {size:.4g} of its unit: {share:.0%} of it, {deviations:.3g} "
     "deviations off zero",
     "drift": "what is left of {quantity} drifts over {cause}, by {size:.4g} a {step}: {share:.0%} of it",
     "delay": "{quantity} comes {size:.4g} s {side}: that is {share:.0%} of what is left",
