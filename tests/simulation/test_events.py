@@ -242,6 +242,18 @@ def test_an_equation_without_a_solution_for_either_side_ends_with_its_condition(
         simulate(Gap(), stop=2.0, inputs={"u": lambda t: t - 1})
     assert np.isfinite(caught.value.result["x"]).all()
 
+    class Climbing(Model):
+        u = Input()
+        x = Real(start=0.0)
+        q = Real(start=0.0, fixed=True)
+
+        def equations(self):
+            yield der(self.q) == self.x
+            yield self.x == self.u + 1.5 * casadi.floor(self.x)  # each whole number leads to a higher one
+
+    with pytest.raises(SolveError, match=r"at t = 1 s no side of the condition on x agrees"):
+        simulate(Climbing(), stop=2.0, inputs={"u": lambda t: t})
+
 
 @pytest.mark.parametrize("points", [2, 21])
 def test_equations_that_switch_on_their_own_unknowns_are_led_through_their_pieces(points):

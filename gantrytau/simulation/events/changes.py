@@ -24,6 +24,7 @@ from gantrytau.simulation.singular_poses import Point
 from gantrytau.simulation.trail import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
+LONGEST_CIRCLE = 100  # choices of modes of which one leads to the next
 HOPS = 3  # of them, one after another
 
 
@@ -39,20 +40,14 @@ class Changes:
         self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
-        arguments = tuple(coordinates.arguments)
+        own = (coordinates.substitutions, tuple(coordinates.arguments), coordinates.states)
         self._impulses: Impulses | None = coordinates.kept(
-            "impulses",
-            lambda: (
-                Impulses(dae, pieces, coordinates.substitutions, arguments, coordinates.states)
-                if turning(dae, pieces)
-                else None
-            ),
+            "impulses", lambda: Impulses(dae, pieces, *own) if turning(dae, pieces) else None
         )
         free = self._impulses is None and not dae.flat.slips
         self._idle = coordinates.idle if free else np.zeros_like(coordinates.idle)
-        self._timed = np.array(
-            [all(coordinates.switches.timed[k] for k in own) for own in coordinates.rounds.of]
-        )
+        timed = coordinates.switches.timed
+        self._timed = np.array([all(timed[k] for k in conditions) for conditions in coordinates.rounds.of])
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self._hops = np.zeros(self._holding.size, dtype=int)
@@ -296,9 +291,7 @@ class Changes:
             last, began = self._acted.get(i, (-np.inf, rates))
             if t == last:  # another round of one instant
                 continue
-            away = (
-                np.maximum(np.abs(began[own]), np.abs(rates[own])) * (t - last) / 4
-            )  # farthest, of a parabola
+            away = np.maximum(np.abs(began[own]), np.abs(rates[own])) * (t - last) / 4  # of a parabola
             self._hops[i] = self._hops[i] + 1 if own and np.all(away < HOP * noise[own]) else 0
             if self._hops[i] >= HOPS:
                 raise run_ends.accumulating(self.coordinates.dae, t, self.coordinates.rounds.whens[i].label)
@@ -323,6 +316,12 @@ class Changes:
             modes = self._led_to(k, modes, errors, before)
             if np.array_equal(modes, tried[-1]):
                 return
+            if (
+                len(tried) > LONGEST_CIRCLE
+            ):  # each leads further away, as floor(x) of a loop with a gain above one
+                raise run_ends.no_side(
+                    self.coordinates.dae, float(t), self.conditions(np.flatnonzero(modes != tried[0]))
+                )
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
