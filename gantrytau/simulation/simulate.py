@@ -63,8 +63,8 @@ def simulate(
     With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
     an FMU keeps the states of its export.
     max_step: s, the longest step. Without it, steps are short enough for functions of time, of inputs and in the model,
-    that rest and then change for a 10,000th of the run; what is shorter and smooth may be stepped over, and forces that are
-    narrower than a thousandth of all the way. What switches (`if_else`) is found however often it turns.
+    that rest and then change for a 10,000th of the run; what is shorter and smooth may be stepped over, and forces along a
+    state that are narrower than a hundredth of its largest value. What switches (`if_else`) is found however often it turns.
     limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
     "stop" ends the run there as `terminate` does, None does not look.
     singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.

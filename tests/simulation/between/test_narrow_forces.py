@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import Model, Real, der, exp, simulate
+from gantrytau import Model, Real, der, exp, fabs, pre, reinit, simulate, when
 
 NEAR = 1e-6  # of the speed: a hundred times the tolerance, as the hill amplifies errors where the mass turns
 
@@ -37,6 +37,21 @@ def test_a_force_whose_square_is_no_number_stops_nothing():
     """At 2.8 m it is 1e-157 N, the square of which is below all numbers."""
     found, _ = thrown(0.1, 4.7, 501)
     assert abs(found.final("v") + 1) < NEAR
+
+
+def test_a_wall_is_not_passed_in_a_long_run():
+    """Between a wall and a narrow hill, against which it has half of the energy, a mass never gets behind the hill."""
+
+    class Court(Model):
+        x = Real(start=-1.0, fixed=True)
+        v = Real(start=1.0, fixed=True)
+
+        def equations(self):
+            yield der(self.x) == self.v
+            yield der(self.v) == 2 * self.x / 0.01**2 * exp(-((self.x / 0.01) ** 2))
+            yield when(fabs(self.x) >= 1, reinit(self.v, -pre(self.v)))
+
+    assert simulate(Court(), stop=100.0)["x"].max() < 0
 
 
 @pytest.mark.nightly
