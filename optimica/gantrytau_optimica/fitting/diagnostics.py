@@ -251,15 +251,16 @@ def _of_order(
     least = -float(ndtri(CHANCE / 2)) / np.sqrt(max(pairs, 1.0))
     if followed is not None and followed.deviations > SURE and followed.share > FOLLOWS:
         yield followed
-    elif correlation > least:
+        return
+    most = limit(len(one.left) - one.jacobian.shape[1])
+    if correlation > least:
+        most *= 2  # of noise that is not white, and not quite normal
         yield Fact("not white", one.name, correlation, held=least)
-    else:
-        most = limit(len(one.left) - one.jacobian.shape[1])
-        for s in one.series if one.scale > 0 else ():
-            far = np.abs(one.robust[one.of(s)]) / one.scale
-            if np.any(far > most):
-                name = f"{one.name} of {s.run}" if len(one.series) > 1 and s.run else one.name
-                yield Fact("outliers", name, float(far.max()), s.numbers[far > most])
+    for s in one.series if one.scale > 0 else ():
+        far = np.abs(one.robust[one.of(s)]) / one.scale
+        if np.any(far > most):
+            name = f"{one.name} of {s.run}" if len(one.series) > 1 and s.run else one.name
+            yield Fact("outliers", name, float(far.max()), s.numbers[far > most])
 
 
 def _correlation(one: _Quantity) -> tuple[float, float]:
