@@ -13,6 +13,7 @@ from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import undetermined, without_inertia
+from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.errors import StructureError
 from gantrytau.flattening.flat_model import FlatModel
@@ -75,7 +76,9 @@ def _free(block: Block, matrix: np.ndarray) -> list[str]:
     """Unknowns that a matrix leaves free."""
     if not np.all(np.isfinite(matrix)):
         return []
-    for _ in range(ROUNDS):  # units and sizes of bodies count for nothing
+    rows, columns = balance(matrix, 1)  # units and sizes of bodies count for nothing
+    matrix = rows * matrix * columns
+    for _ in range(ROUNDS):
         matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=1, keepdims=True)), 1e-150)
         matrix = matrix / np.maximum(np.sqrt(np.abs(matrix).max(axis=0, keepdims=True)), 1e-150)
     _, values, right = np.linalg.svd(matrix)

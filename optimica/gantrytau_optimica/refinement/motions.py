@@ -58,10 +58,9 @@ def _missed(found: Optimum) -> str:
     scheme = found.program.places.layouts[0].scheme.scheme
     if not found.success or scheme == "shooting" or not any(map(_doubtful, found.phases.values())):
         return ""
-    if (
-        not found.playback.complete
-    ):  # loops may be singular at a place that the solution passes between its points
-        away = not found.built.system.loops or any(p.away > 1.0 for p in found.playback.phases.values())
+    if not found.playback.complete:  # algebraics may be singular between two points that the solution passes
+        plain = not any(one.phase.algebraics for one in found.phases.values())
+        away = plain or any(p.away > 1.0 for p in found.playback.phases.values())
         return found.playback.lines()[0] if away else ""
     worst = max(found.playback.defects, key=lambda d: d.relative, default=None)
     if worst is None or worst.relative <= 1.0:
