@@ -176,25 +176,25 @@ def _sized_run(
 
 
 def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:
-    def number(value: Any, *kinds: type) -> bool:
-        return isinstance(value, (*kinds, float, np.floating)) and bool(np.isfinite(value))
-
-    times = number(start, int, np.integer) and number(stop, int, np.integer) and start < stop
-    whole = isinstance(points, (int, np.integer)) and not isinstance(points, bool) and points >= 2
-    step = max_step is None or (number(max_step, int, np.integer) and max_step > 0)
-    for right, argument, found, expected in (
-        (times, "stop", f"start={start!r} and stop={stop!r}", "start < stop, both finite numbers in s"),
-        (
-            number(tolerance) and 0 < tolerance < 1,
-            "tolerance",
-            f"tolerance={tolerance!r}",
-            "a number between 0 and 1, as 1e-8",
-        ),
-        (step, "max_step", f"max_step={max_step!r}", "a number above zero, in s"),
-        (whole, "points", f"points={points!r}", "a whole number of at least 2"),
-    ):
-        if not right:
-            raise ModelError(f"simulate: found {found}, expected {expected}", argument=argument)
+    numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
+    if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
+        raise ModelError(
+            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s",
+            argument="stop",
+        )
+    if not isinstance(tolerance, (float, np.floating)) or not 0 < tolerance < 1:
+        raise ModelError(
+            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8",
+            argument="tolerance",
+        )
+    if max_step is not None and not (isinstance(max_step, (int, float, np.number)) and 0 < max_step < np.inf):
+        raise ModelError(
+            f"simulate: found max_step={max_step!r}, expected a number above zero, in s", argument="max_step"
+        )
+    if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
+        raise ModelError(
+            f"simulate: found points={points!r}, expected a whole number of at least 2", argument="points"
+        )
 
 
 def _check_words(**given: object) -> None:

@@ -33,7 +33,7 @@ FAMILIES: dict[str, tuple[asked.Family, int, int, float]] = {
     "delayed": (asked.delayed, 6, 30, 0.0),
     "curved": (partial(asked.cells, GRAMMARS["curved"]), 12, 15, 0.05),
     "linkages": (partial(asked.linkages, True), 4, 6, 0.0),
-    "linkages of any mass": (partial(asked.linkages, False), 4, 5, 0.2),
+    "linkages of any mass": (partial(asked.linkages, False), 4, 5, 0.3),
     "thrown, FMU": (partial(asked.thrown_by_signals, fmu=True), 2, 5, 0.0),
     "sampled, FMU": (partial(asked.sampled, fmu=True), 2, 5, 0.0),
     "hybrid, FMU": (partial(asked.hybrid, fmu=True), 7, 7, 0.0),

@@ -16,6 +16,7 @@ from typing import Self
 
 import numpy as np
 
+from gantrytau.describing.record import Record
 from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.scales import Scale, known_scale, scale
 
@@ -25,7 +26,7 @@ _HEADING = re.compile(r"(?P<name>.*?\S)(?P<space>\s*)(?:\[(?P<square>[^\[\]]+)\]
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class Columns(Record):
     """A CSV file with a header: names of the columns, and their numbers in SI, (n,) each, by `column`.
 
     path: the file; header: headings as they stand; lines: (n,) of the rows in the file, from 1.
@@ -60,6 +61,9 @@ class Columns:
             check_cells(path, line, row, len(header), separator)
         numbers = np.array([line for line, _ in kept[1:]], dtype=int)
         return cls(path, header, numbers, [row for _, row in kept[1:]], separator)
+
+    def __repr__(self) -> str:
+        return f"<Columns of {self.path.name}: {', '.join(self.header)}; {len(self)} rows>"
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -55,7 +55,7 @@ def test_a_map_is_read_whole(tmp_path):
         ("a,b\n1,x\n", "line 2, column b: found 'x', expected a number"),
         ("a,b\n1,\n", "line 2, column b: found an empty cell, expected a number"),
         ("1,2\n3,4\n", "found numbers in the first line, expected the names of the columns"),
-        ("x [mm],0,1\n0,1,2\n", r"line 1: found 'x \[mm\]', expected a map without units, in SI"),
+        ("x [mm],0,1\n0,1,2\n", r"found 'x \[mm\]', expected a map without units, in SI"),
         ("a,b,c\n1,2,3\n", r"found the columns a, b, c, expected two of a curve; name them, columns="),
     ],
 )
