@@ -196,8 +196,14 @@ def judged(found: FittedRods) -> list[Finding]:
         *_in_doubt(found),
         *not_converged(found),
         *_undetermined(others),
-        *(f for f in found.diagnostics.findings if f.kind in NOISE),
+        *_other_noise(found),
     ]
+
+
+def _other_noise(found: FittedNumbers) -> Iterator[Finding]:
+    """The findings on residuals of another size than covariances tell; without these nothing is worked out."""
+    if found.measurements.covariance is not None:
+        yield from (f for f in found.diagnostics.findings if f.kind in NOISE)
 
 
 def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Finding]:
