@@ -34,7 +34,7 @@ class ArmFunctions(ModelFunctions):
 
     @cached_property
     def in_a_row(self) -> bool:
-        """Whether it is one: more joints than a position determines, which determine the pose in closed form."""
+        """Whether the arm has more than three joints, and its pose in closed form of them."""
         return len(self.joints) > 3 and len(self._wanted) > 1 and self._forward.closed_form is not None
 
     def ik(self, r, R: Any = None, sides=None):
@@ -69,7 +69,7 @@ class ArmFunctions(ModelFunctions):
         return self.dae.array_function(self.joints, names)(*self.ik(r, R)[0].T)
 
     def solutions(self, r, R: Any = None):
-        """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
+        """Joints (m, n) of all m branches in one pose (1, 3), and the signs (s, m) of each branch."""
         self.check(R)
         pose = np.concatenate([r[0], R[0].T.ravel()])
         q, _ = self._branch.solutions(pose)

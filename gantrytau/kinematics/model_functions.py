@@ -58,7 +58,7 @@ class ModelFunctions:
             return missed <= self.tolerance
 
     def solutions(self, r, R=None) -> tuple[np.ndarray, np.ndarray]:
-        """Joints (m, n) of all branches in one pose (1, 3), and signs that tell them apart, (s, m)."""
+        """Joints (m, n) of all m branches in one pose (1, 3), and the signs (s, m) of each branch."""
         x = self._coordinates(r, R)
         q, signs = self._inverse.solutions(x[0])
         here = np.full(len(q), self._has_rest(x, r, R)[0])

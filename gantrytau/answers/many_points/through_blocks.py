@@ -106,7 +106,7 @@ class ThroughBlocks:
         return known[len(q) :]
 
     def solutions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unknowns (n, m) of all branches at one point (k,) and signs that tell them apart, (s, m)."""
+        """Unknowns (n, m) of all m branches at one point (k,), and the signs (s, m) of each branch."""
         known, signs = q[:, None], np.zeros((0, 1))
         for used, step in self._steps:
             ways = [

@@ -128,7 +128,7 @@ class Impulses:
         arguments: Sequence[ca.SX],
         states: Sequence[str],
     ):
-        """arguments: x, z, time, t0, w, to which `ways` lead one after another, the last from modes that are not kept."""
+        """ways: substitutions in order, from all symbols to `arguments`: x, z, time, t0, w; the last is that of modes."""
         self.dae, self._outside, self._arguments = dae, ways[-1], arguments
         self.levels = levels = Levels(dae, pieces.residuals, tuple(pieces.known))
         known = (order for _, order in map(split_derivative, levels.known))

@@ -1,4 +1,4 @@
-"""Looks: places at which switches are asked, so close that none turns there and back between two of them.
+"""Looks: times at which margins of switches are evaluated, close enough to see each switch turn.
 
 The argument of a sine, a cosine or a tangent within a margin moves by less than a share of its period from one look to the
 next, and the cubic through the values and rates at two looks foretells the one between them.

@@ -53,7 +53,7 @@ def without_following(built: Built, ends: Ends | None = None) -> ControlProblem:
 
 
 def contradicted(phases: Iterable[Trajectory], ends: Ends) -> str:
-    """The first of the conditions that follow from others which a motion without them misses, in words; "" if none."""
+    """The first dependent end condition missed by a motion without dependent conditions, in words; "" if none."""
     for limit, state in ends:
         for phase in phases:
             if any(s.symbol.element_hash() == state.symbol.element_hash() for s in phase.phase.states):
@@ -96,7 +96,7 @@ def _dependent(built: Built, phase: Phase, ends: dict[int, float]) -> list[int]:
 
 
 def _unmoved(matrix: np.ndarray) -> np.ndarray:
-    """Directions (n, k) among rows (n,) of a matrix in which it vanishes; none where it is not finite."""
+    """Left null space (n, k) of a matrix with n rows; empty for a matrix that is not finite."""
     if not np.all(np.isfinite(matrix)):
         return np.zeros((len(matrix), 0))
     left, values, _ = np.linalg.svd(matrix)
@@ -104,7 +104,7 @@ def _unmoved(matrix: np.ndarray) -> np.ndarray:
 
 
 def _decided(flat: np.ndarray) -> list[int]:
-    """One row for each direction: the last that moves with others, but not where it has a turning point."""
+    """One dependent row for each direction of the null space: the last one without a turning point."""
     found: list[int] = []
     for _ in range(flat.shape[1]):
         share = np.linalg.norm(flat, axis=1)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.language.tables.columns import SEPARATORS, check_cells, number_of
+from gantrytau.language.tables.columns import SEPARATORS, check_cells, is_number, number_of
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.identification.logs.log_columns import EXPECTED, LogColumn, columns_of
 
@@ -77,7 +77,7 @@ def _head(path: Path, text: str) -> tuple[str, list[str], int, int]:
     for _ in range(HEAD):
         end = text.find("\n", start) + 1 or len(text)
         line = text[start:end].strip()
-        if line and _is_number(re.split(r"[;\t,\s]", line)[0].strip('"')):
+        if line and is_number(re.split(r"[;\t,\s]", line)[0].strip('"'), ","):
             break
         names, start = line.lstrip("#").strip() or names, end
         if start == len(text):
@@ -91,14 +91,6 @@ def _head(path: Path, text: str) -> tuple[str, list[str], int, int]:
     separator = next((one for one in SEPARATORS if one in names), " ")
     header = next(csv.reader([names], delimiter=separator)) if separator != " " else names.split()
     return separator, header, text.count("\n", 0, start), start
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _numbers(

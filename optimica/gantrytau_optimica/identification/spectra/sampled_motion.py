@@ -32,7 +32,7 @@ def sampled_motion(
 
 
 def rows_of(place: str, name: str, values: Any) -> np.ndarray:
-    """Numbers that cannot be written to: times t (N,), else rows (N, n), of which (N,) is one column. Raises ModelError."""
+    """A read-only array: times t (N,), else rows (N, n); (N,) becomes one column. Raises ModelError for other shapes."""
     try:
         found = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
