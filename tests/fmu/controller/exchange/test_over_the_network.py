@@ -120,11 +120,17 @@ def raw(server, said, transport="udp"):
 STREAM = Introduction("stream", sends=Declaration([DELTA]))
 
 
-def test_wrong_duplicate_and_old_messages_only_count():
-    rig = Run()
+def connected(rig):
+    """A socket in the place of `stream`, which is given samples from now on: the reply comes shortly before that."""
     own, reply = raw(rig.server, STREAM)
     assert reply.kind == MessageKind.DECLARE
     rig.server.wait()
+    return own
+
+
+def test_wrong_duplicate_and_old_messages_only_count():
+    rig = Run()
+    own = connected(rig)
     rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
     own.recv(65536)
     good = encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5])))

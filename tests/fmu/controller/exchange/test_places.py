@@ -21,7 +21,7 @@ from gantrytau_fmu.controller.exchange.messages import (
     framed,
 )
 from tests.fmu.controller.conftest import DELTA, Q_REF, slide
-from tests.fmu.controller.exchange.test_over_the_network import STREAM, N, Run, answers, raw
+from tests.fmu.controller.exchange.test_over_the_network import STREAM, N, Run, answers, connected, raw
 
 SOON = 0.3  # s, in place of the 3 s after which somebody is absent
 
@@ -75,7 +75,7 @@ def test_who_came_long_before_the_run_is_waited_for_from_the_first_sample_on():
 )
 def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused, words):
     rig = Run()
-    own, _ = raw(rig.server, STREAM)
+    own = connected(rig)
 
     def answer():
         while (got := decoded(own.recv(65536))).kind == MessageKind.SUBMIT:
@@ -97,7 +97,7 @@ def test_a_refused_answer_is_one_too_and_the_clock_goes_on(refused, words):
 
 def test_who_is_silent_is_waited_for_once():
     rig = Run()
-    own, _ = raw(rig.server, STREAM)
+    own = connected(rig)
     begin = time.monotonic()
     found = rig.run()
     assert 2.0 < time.monotonic() - begin < 4.0  # a second for each of two samples, not one for each of all
@@ -108,7 +108,7 @@ def test_who_is_silent_is_waited_for_once():
 def test_an_answer_that_is_lost_costs_its_own_sample_and_no_other():
     """Equal runs have equal logs: the clock waits for the answer behind the one that was lost."""
     rig = Run()
-    own, _ = raw(rig.server, STREAM)
+    own = connected(rig)
 
     def answer():
         while (got := decoded(own.recv(65536))).kind == MessageKind.SUBMIT:
@@ -183,7 +183,7 @@ def test_one_who_declares_under_another_name_leaves_its_first_place():
 
 def test_a_declaration_once_more_forgets_no_answer():
     rig = Run()
-    own, _ = raw(rig.server, STREAM)
+    own = connected(rig)
     rig.place.submit(Sample(6, 0, np.zeros(3)), Declaration())
     own.send(encoded(Message(MessageKind.OBTAIN, 5, 0, np.array([0.5]))))
     until(lambda: rig.place.answer(10) is not None)
