@@ -6,12 +6,8 @@ from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.answers.linearization import Linearization, linearize
-from gantrytau.dae import Dae, translate
-from gantrytau.describing.describe import describe
-from gantrytau.describing.described import Description
-from gantrytau.ensembles.study import study
-from gantrytau.ensembles.study_record import Study
-from gantrytau.errors import (
+from gantrytau.border.columns import Columns
+from gantrytau.border.refusal import (
     DoubtfulResult,
     GantryTauError,
     InitializationError,
@@ -20,6 +16,12 @@ from gantrytau.errors import (
     StructureError,
     did_you_mean,
 )
+from gantrytau.border.units import in_unit, si
+from gantrytau.dae import Dae, translate
+from gantrytau.describing.describe import describe
+from gantrytau.describing.described import Description
+from gantrytau.ensembles.study import study
+from gantrytau.ensembles.study_record import Study
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
 from gantrytau.inputs.deterministic_signals import chirp, multisine, steps
@@ -73,11 +75,9 @@ from gantrytau.language.functions import (
 )
 from gantrytau.language.model import Connector, Declared, Model, check_member, outer
 from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
-from gantrytau.language.scales import in_unit, si
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time
-from gantrytau.language.tables.columns import Columns
 from gantrytau.language.tables.read_table import read_table
 from gantrytau.language.tables.tables import table
 from gantrytau.results.figures import has_windows

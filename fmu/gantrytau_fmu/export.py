@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from gantrytau import Dae, Model, translate
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen

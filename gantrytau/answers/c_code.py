@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "

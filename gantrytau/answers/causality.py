@@ -8,12 +8,12 @@ import casadi as ca
 
 from gantrytau.answers.function_through import Question, function_through
 from gantrytau.answers.implicit_blocks import one_where
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.compiler.blocks.pattern import Pattern, block_pattern
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated, carefully, solved
 from gantrytau.compiler.translation import translate_flat
-from gantrytau.errors import ModelError, StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 Answer = TypeVar("Answer")

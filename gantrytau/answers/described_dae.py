@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gantrytau.border.units import scale
 from gantrytau.compiler.translated import Translated
 from gantrytau.describing.described import Description, Listing
 from gantrytau.describing.short_values import array_words, number
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
-from gantrytau.language.scales import scale
 from gantrytau.language.symbols import split_derivative
 
 LONG = 6  # elements of a vector that is spoken

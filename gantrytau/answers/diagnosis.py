@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau.answers.other_assemblies import Assembly, assemblies
-from gantrytau.compiler.alphabets import values_at
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.request import Request
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.describing.record import Record
-from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel, Loop, When
 from gantrytau.flattening.flatten import flatten

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError, ModelError
+from gantrytau.border.units import given as in_si
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import StartValues, contradicts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
-from gantrytau.errors import InitializationError, ModelError
 from gantrytau.flattening.shapes import elements_of
-from gantrytau.language.scales import given as in_si
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 STEP = 0.3  # m or rad between stops on the way to given positions

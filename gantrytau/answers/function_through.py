@@ -13,8 +13,8 @@ from itertools import accumulate
 import casadi as ca
 
 from gantrytau.answers.implicit_blocks import Implicit, solved_one_by_one
-from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.blocks.solution import SolvedBlocks
+from gantrytau.compiler.symbol_spaces import column
 
 
 @dataclass(frozen=True, eq=False)

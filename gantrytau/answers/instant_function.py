@@ -10,10 +10,10 @@ from dataclasses import replace
 import casadi as ca
 
 from gantrytau.answers.causality import function
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
-from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.whens import one_round
 from gantrytau.language.statements import Equation

@@ -17,13 +17,13 @@ from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
 from gantrytau.answers.linear_systems.discretisation import held
 from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_period
 from gantrytau.answers.linear_systems.sample_to_sample import DrivenRows, from_sample_to_sample
-from gantrytau.compiler.alphabets import column, values_at
+from gantrytau.border.refusal import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
-from gantrytau.errors import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking, refuse_whens
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative

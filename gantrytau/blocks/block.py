@@ -3,7 +3,7 @@
 from typing import Any
 
 from gantrytau import Input, Model, Output
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 
 class Block(Model):

@@ -5,7 +5,7 @@ from typing import Any
 
 from gantrytau import Input, Model, Output, Parameter, Real, connect, der, if_else, require, sampled
 from gantrytau.blocks.limiters import Limiter, Unlimited
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 KINDS = ("P", "PI", "PD", "PID")
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from gantrytau import Parameter, Real, require
 from gantrytau.blocks.block import Block
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 
 class Rational(Block):

@@ -11,9 +11,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Chains
 from gantrytau.compiler.definitions import Definitions
 from gantrytau.compiler.parameters import ParameterTable
+from gantrytau.compiler.symbol_spaces import Chains
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import values_at
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.units import given
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 from gantrytau.flattening.shapes import fits
-from gantrytau.language.scales import given
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.refusals import open_loops, overdriven
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues, start_values
-from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 

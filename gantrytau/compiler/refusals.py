@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError, ModelError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.dulmage_mendelsohn import decompose, signature
-from gantrytau.errors import InitializationError, ModelError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative

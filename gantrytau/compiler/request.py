@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 
 @dataclass(frozen=True)

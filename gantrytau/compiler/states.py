@@ -12,10 +12,10 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import dependent, no_state
 from gantrytau.compiler.start.balance import balance
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import derivative_name, split_derivative
 

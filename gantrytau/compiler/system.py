@@ -8,12 +8,12 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.blocks.inverse_form import Inverse, SortedEquations, inverse_of, torn_of
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block
+from gantrytau.compiler.symbol_spaces import Substitution, column
 from gantrytau.compiler.translated import Origin, Translated, origin_of
-from gantrytau.errors import ModelError
 
 Causality = Literal["inverse", "forward"]
 

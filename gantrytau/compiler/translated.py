@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
-from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.blocks.pattern import Pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_anew, solve_blocks
@@ -19,6 +18,7 @@ from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.states import StateChoice
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import casadi as ca
 
+from gantrytau.border.refusal import InitializationError, ModelError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.blocks.cancellation import combined
 from gantrytau.compiler.blocks.determinacy import massless, refuse_undetermined
@@ -20,7 +21,6 @@ from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import start_values
 from gantrytau.compiler.states import choose_states
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import InitializationError, ModelError, StructureError
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten

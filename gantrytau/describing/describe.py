@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from typing import Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.described import Description, Listing
 from gantrytau.describing.short_values import LENGTH, cut, short
-from gantrytau.errors import ModelError, did_you_mean
 
 HIDDEN = {"gantrytau.describing.record", "abc", "typing"}  # modules of bases that are not told
 

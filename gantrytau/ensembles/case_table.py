@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.ensembles.cases import CASE, SEED, Axes, Case
-from gantrytau.errors import ModelError
 from gantrytau.results.data_frames import scalars
 from gantrytau.results.files import extra_module
 from gantrytau.results.result import Result

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 
 SEED = "seed"  # the name of the axis of seeds
 CASE = "case"  # the name of the axis of values that go together

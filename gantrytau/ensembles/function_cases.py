@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.ensembles.cases import SEED, Axes, Case
-from gantrytau.errors import ModelError, did_you_mean
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from gantrytau.ensembles.workers.parcels import pack, unpack
+from gantrytau.border.refusal import ModelError
+from gantrytau.ensembles.workers.payloads import pack, unpack
 from gantrytau.ensembles.workers.worker import Outcome
-from gantrytau.errors import ModelError
 from gantrytau.whole_files import replacing
 
 DIGEST = 32  # bytes of SHA-256

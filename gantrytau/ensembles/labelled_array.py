@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.ensembles.case_table import FAILURE
 from gantrytau.ensembles.cases import CASE, SEED, Axes, Case
-from gantrytau.errors import ModelError
 from gantrytau.results.files import extra_module
 from gantrytau.results.result import Result
 

@@ -4,14 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Literal, TypedDict
 
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.units import given
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_model
 from gantrytau.ensembles.cases import SEED, Axes, Case
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.model import Model
-from gantrytau.language.scales import given
 from gantrytau.results.result import Result
 from gantrytau.simulation.simulate import simulate
 

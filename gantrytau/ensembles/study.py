@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, Unpack
 
+from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.translated import Translated
 from gantrytau.ensembles.cases import Axes, Case, read_axes
 from gantrytau.ensembles.digests import digest
@@ -14,7 +15,6 @@ from gantrytau.ensembles.kept_cases import KeptCases
 from gantrytau.ensembles.model_cases import ModelTask, SimulationKeywords, labels, model_task, over_in_si
 from gantrytau.ensembles.study_record import Study
 from gantrytau.ensembles.workers.places import Place, outcomes, read_place
-from gantrytau.errors import SolveError
 from gantrytau.language.model import Model
 from gantrytau.progress import Progress
 

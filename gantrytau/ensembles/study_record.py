@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau.ensembles.case_table import case_table
 from gantrytau.ensembles.cases import SEED, Axes, Case, FailedCase, equal, spoken
-from gantrytau.ensembles.fan import draw_fan
+from gantrytau.ensembles.ensemble_plot import draw_fan
 from gantrytau.ensembles.labelled_array import labelled
 from gantrytau.ensembles.workers.worker import Outcome
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.results.display_units import Display
 from gantrytau.results.files import extra_module
 from gantrytau.results.result import Result

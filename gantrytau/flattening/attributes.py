@@ -5,13 +5,13 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import ModelError, in_words
+from gantrytau.border.refusal import ModelError, in_words
+from gantrytau.border.units import given, known_scale
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.flattening.instantiation import Leaf, Placed
 from gantrytau.flattening.shapes import fits, joined, numpy_shape
 from gantrytau.language.declarations import Formula, Parameter, StateSelect, evaluate
 from gantrytau.language.instructions import refuse_calls
-from gantrytau.language.scales import given, known_scale
 
 
 def flat_variable(placed: Placed) -> FlatVariable:

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.dimensions import ONE, Dimension, dimension, unit_text, whole
+from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.instants import delay_equations, unit_equations
 from gantrytau.flattening.whens import when_units
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
-from gantrytau.language.units import ONE, Dimension, dimension, unit_text, whole
 
 NUMBER = "number"
 ANY = "any"

@@ -5,7 +5,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.language.declarations import Quantity

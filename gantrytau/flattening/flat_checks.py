@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.instructions import refuse_calls

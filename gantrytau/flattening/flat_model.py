@@ -6,14 +6,14 @@ from functools import cached_property
 
 import casadi as ca
 
+from gantrytau.border.dimensions import per_second
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.language.statements import Equation, Requirement
 from gantrytau.language.symbols import Range, derivative_name, split_derivative
-from gantrytau.language.units import per_second
 
 
 @dataclass(frozen=True, eq=False)

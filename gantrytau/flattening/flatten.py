@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import told
+from gantrytau.border.refusal import told
 from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_checks import (

@@ -9,7 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import shape_of
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start, evaluate, is_setting
 from gantrytau.language.events import CurrentMode, Mode, mode_number
 from gantrytau.language.model import (
@@ -20,7 +21,6 @@ from gantrytau.language.model import (
     check_member,
     refuse_container,
 )
-from gantrytau.language.scales import shape_of
 from gantrytau.language.symbols import Symbols, element_names, time
 
 ATTRIBUTES = (

@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import Delay, FlatModel, FlatVariable, Sampled, StickSlip
 from gantrytau.flattening.propagation import Spread
 from gantrytau.flattening.shapes import joined

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatVariable, Loop
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.flattening.propagation import propagated

@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import ModelError, StructureError
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.flattening.flat_model import Loop
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.model import Connector

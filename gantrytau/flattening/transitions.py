@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.flattening.instantiation import Instance, Leaf, Placed
 from gantrytau.flattening.whens import condition_of, place_of
 from gantrytau.language.declarations import Discrete, Quantity, Real

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel, When
 from gantrytau.flattening.instants import declared, sized
 from gantrytau.language.events import Happening, Reinit, Terminate, WhenChain

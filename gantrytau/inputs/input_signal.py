@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError, told
+from gantrytau.border.refusal import ModelError, told
 from gantrytau.inputs.samples import SAME, Samples
 
 MOST = 10_000_000  # values that one signal holds in a run

@@ -6,7 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.inputs.input_signal import (
     HeldSignal,
     check_positive,

@@ -6,9 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import known_scale, scale
 from gantrytau.flattening.shapes import fits
-from gantrytau.language.scales import known_scale, scale
 
 LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, across which nothing is known
 SMALL = 1e-9  # of a run, by which samples may fail to cover it: ends of times are sums

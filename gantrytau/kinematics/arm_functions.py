@@ -15,7 +15,7 @@ import numpy as np
 
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
 from gantrytau.answers.many_points.grown_branch import GrownBranch
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, independent, limits_of, twists
 
 NEIGHBOURS = (

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, real, shown, vectors
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from gantrytau.answers.many_points.elimination import solved
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.kinematics.arm_functions import ArmFunctions
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of, limits_of
 from gantrytau.kinematics.poses import answered, floats, poses, real, vectors

@@ -13,8 +13,8 @@ import numpy as np
 
 from gantrytau.answers.many_points.array_function import ArrayFunction
 from gantrytau.answers.many_points.elimination import solved
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.dae import Dae
-from gantrytau.errors import ModelError, StructureError
 from gantrytau.kinematics.rods.lengths_by_newton import limited
 from gantrytau.kinematics.rods.rod_robots import Home
 from gantrytau.kinematics.rotations import of_quaternion, of_quaternions, quaternions, skewed

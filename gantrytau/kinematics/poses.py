@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 NOT_ROTATION = 1e-6  # of an element of R.T R - I
 

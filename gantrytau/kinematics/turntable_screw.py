@@ -17,7 +17,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.poses import floats, real, shown
 
 FLAT = 1e-6  # of OP and OQ: how far pivots may be from one plane across the axis

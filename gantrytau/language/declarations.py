@@ -12,9 +12,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import shape_of
 from gantrytau.describing.short_values import short
-from gantrytau.errors import ModelError
-from gantrytau.language.scales import shape_of
 
 Component = TypeVar("Component")
 

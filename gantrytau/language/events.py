@@ -11,7 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.declarations import Discrete
 from gantrytau.language.functions import if_else, logic_and, logic_or
 from gantrytau.language.symbols import delayed

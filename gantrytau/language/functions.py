@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Formula
 from gantrytau.language.piecewise import smoothly
 

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 Value = TypeVar("Value")
 

@@ -8,9 +8,9 @@ import functools
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Self, TypeGuard
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.described import Description
 from gantrytau.describing.short_values import LENGTH, WHOLE, joined, short
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import Array, Bounds, Fixed, Quantity, Start, is_setting
 from gantrytau.language.self_description.described_model import model_described
 

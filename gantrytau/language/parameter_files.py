@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import ModelError
-from gantrytau.language.scales import si
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import si
 
 OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start
 from gantrytau.language.model import Declared, Outer, check_member, merge
 

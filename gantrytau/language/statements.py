@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.functions import Between
 from gantrytau.language.model import Connector, Declared
 from gantrytau.language.symbols import scalars

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.instructions import refuse_calls
 
 LONG = 60  # of an expression in a message, from where on only its symbols are named

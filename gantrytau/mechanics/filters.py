@@ -11,7 +11,7 @@ from math import comb, factorial, pi
 import numpy as np
 
 from gantrytau import Input, Model, Output, Parameter, der
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 
 class LowPass(Model):

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.results.display_units import SI, Display, shown_units
 from gantrytau.results.files import extra_module
 from gantrytau.results.series import Series

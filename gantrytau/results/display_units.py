@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.scales import Scale, known_scale, scale
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.units import Scale, known_scale, scale
 from gantrytau.results.series import Series, split_element
 
 Display = str | Mapping[str, str] | None  # as callers say it

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.errors import GantryTauError, ModelError, did_you_mean
+from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean
 from gantrytau.results.display_units import SI, Display, Shown, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import derivative_name, split_derivative

@@ -8,11 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution
+from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import StartValues
+from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import SolveError
 from gantrytau.language.symbols import derivative_name, time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.margins import Switches

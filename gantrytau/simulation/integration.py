@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
-from gantrytau.simulation import run_ends
+from gantrytau.simulation import simulation_errors as run_ends
 from gantrytau.simulation.between.across import across, lay, left_at
 from gantrytau.simulation.between.narrow_forces import NarrowForces
 from gantrytau.simulation.between.pulses import functions_of_time, pulses
@@ -21,7 +21,7 @@ from gantrytau.simulation.memory.past_values import PastValues
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
-from gantrytau.simulation.trail import LEAST_STEPS, Trail
+from gantrytau.simulation.time_grid import LEAST_STEPS, Trail
 
 CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails

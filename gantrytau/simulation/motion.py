@@ -4,13 +4,13 @@ from collections.abc import Collection, Mapping, Sequence
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import column
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import SolvedBlocks, solve_anew, solve_blocks
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.dependents import definitions_of, dependents
 from gantrytau.simulation.events.impulses import turning

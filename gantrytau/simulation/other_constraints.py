@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.redundancy import soundness
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
-from gantrytau.errors import InitializationError, StructureError
 from gantrytau.results.result import Result
 from gantrytau.simulation.integration import Run
 from gantrytau.simulation.to_result import result_of

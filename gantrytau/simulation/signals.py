@@ -7,13 +7,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import given as in_si
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.shapes import check_shape, elements_of, joined, numpy_shape
 from gantrytau.inputs.input_signal import Span, with_course, with_seeds
 from gantrytau.inputs.samples import Samples
 from gantrytau.language.instructions import refuse_calls
-from gantrytau.language.scales import given as in_si
 from gantrytau.language.symbols import time
 
 

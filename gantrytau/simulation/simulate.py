@@ -11,12 +11,12 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from gantrytau.border.refusal import DoubtfulResult, ModelError, SolveError
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
-from gantrytau.errors import DoubtfulResult, ModelError, SolveError
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.start.balance import NOISE, balance
 from gantrytau.compiler.start.consistency import ROUNDING
-from gantrytau.errors import SolveError
 from gantrytau.language.term_sizes import term_sizes
 from gantrytau.simulation.events.at_places import at_places
 

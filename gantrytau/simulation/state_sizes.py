@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau.compiler.translated import Translated
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 SMALL = 1e-3  # of the size that is taken, if nothing is said: what stays below has another one
 LEAST = 1e-6  # of the largest state that it hangs together with: a smaller one may be rounding

@@ -6,9 +6,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.dimensions import per_second
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
-from gantrytau.language.units import per_second
 from gantrytau.results.result import Result
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates

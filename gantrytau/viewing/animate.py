@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.dae import Dae, translate
-from gantrytau.errors import ModelError
 from gantrytau.language.model import Model
 from gantrytau.results.result import Result
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.dae import Dae
-from gantrytau.errors import ModelError
 from gantrytau.language.self_description.appearance import Shape, Value
 from gantrytau.results.result import Result
 from gantrytau.results.series import Series

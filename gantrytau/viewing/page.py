@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.viewing.film import Film
 from gantrytau.viewing.solids import COLOURS, Solid, extent, solids
 from gantrytau.whole_files import replacing

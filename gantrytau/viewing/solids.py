@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import (
     Ball,
     Cloud,

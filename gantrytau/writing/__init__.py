@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import ModelError
 
 FORMATS = ("text", "latex", "html", "modelica")
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.instructions import computed
 
 FUNCTIONS = {

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import casadi as ca
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import ModelError
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.statements import Equation

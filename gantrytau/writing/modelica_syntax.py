@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau.writing.syntax import AND, CHOICE, OR, POWER, PRODUCT, SUM, Arguments, Written, infix
 from gantrytau.writing.text import WORDS, plain_number

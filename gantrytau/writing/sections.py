@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import column
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.statements import Equation
 from gantrytau.writing.collect import collected

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.syntax import Syntax, Written, ordered, write
 

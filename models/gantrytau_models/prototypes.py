@@ -23,8 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_models.quantities import (
     REMEDY,
     ROUNDING,

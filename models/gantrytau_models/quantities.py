@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]

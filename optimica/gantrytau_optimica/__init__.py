@@ -5,6 +5,21 @@ from gantrytau_optimica.answers.archive.optimum_files import load_optimum, save_
 from gantrytau_optimica.answers.archive.run_record import compare_records, run_record, write_record
 from gantrytau_optimica.answers.archive.saved_optimum import MissingGuess, SavedOptimum
 from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
+    CalibrationVerdict,
+    judge,
+    told_by_tool,
+)
+from gantrytau_optimica.calibration.assessment.cross_validation import (
+    CrossValidation,
+    cross_validate,
+    held_out,
+)
+from gantrytau_optimica.calibration.assessment.parameter_rows import (
+    ParameterRow,
+    calibrated_geometry,
+    parameter_rows,
+)
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.file_lines import in_lines
@@ -20,20 +35,16 @@ from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
 from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
 from gantrytau_optimica.calibration.devices.sight import Bars
-from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
-from gantrytau_optimica.calibration.judging.device_frames import frame_words
-from gantrytau_optimica.calibration.report.report import About, report_numbers, write_report
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
-from gantrytau_optimica.calibration.surveys.error_maps import error_map
-from gantrytau_optimica.calibration.surveys.guideways import linearity
-from gantrytau_optimica.calibration.surveys.orientation_errors import orientation_causes, orientation_errors
-from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict, judge, told_by_tool
-from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation, cross_validate, held_out
-from gantrytau_optimica.calibration.trust.parameter_rows import (
-    ParameterRow,
-    calibrated_geometry,
-    parameter_rows,
+from gantrytau_optimica.calibration.diagnostics.device_frames import frame_words
+from gantrytau_optimica.calibration.error_analysis.error_maps import error_map
+from gantrytau_optimica.calibration.error_analysis.guideways import linearity
+from gantrytau_optimica.calibration.error_analysis.orientation_errors import (
+    orientation_causes,
+    orientation_errors,
 )
+from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
+from gantrytau_optimica.calibration.report.report import About, report_numbers, write_report
 from gantrytau_optimica.estimation.estimate import estimate
 from gantrytau_optimica.estimation.estimation import Estimate
 from gantrytau_optimica.estimation.experiments import Experiment
@@ -76,6 +87,7 @@ from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptim
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.pose_maps import StraightAxes
 from gantrytau_optimica.learning.rig import Rig
+from gantrytau_optimica.learning.run_variation import Scatter
 from gantrytau_optimica.learning.runs.corrections_file import read_corrections
 from gantrytau_optimica.learning.runs.estimated_response import arm_model, estimated_response
 from gantrytau_optimica.learning.runs.history import History
@@ -84,7 +96,6 @@ from gantrytau_optimica.learning.runs.learn import LearningError, learn
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
 from gantrytau_optimica.learning.runs.repeat import Repetitions, repeat
 from gantrytau_optimica.learning.runs.simulator_plant import SimulatorPlant
-from gantrytau_optimica.learning.scatter import Scatter
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
 from gantrytau_optimica.prepared import Prepared

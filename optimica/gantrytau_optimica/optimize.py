@@ -15,14 +15,14 @@ from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.failures.dependence import check_freedom
-from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
+from gantrytau_optimica.guesses_and_parameters import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses, Policy, PolicyKeywords, policy_of
 from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.problem_checks import one_point
 from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
-from gantrytau_optimica.refinement.reached import BestSoFar
+from gantrytau_optimica.refinement.incumbent import BestSoFar
 from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.solving.ipopt import Solver

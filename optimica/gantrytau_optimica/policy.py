@@ -8,8 +8,8 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.compiler.system import Causality
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.solving.clock import Progress
 from gantrytau_optimica.solving.ipopt import SolverSettings

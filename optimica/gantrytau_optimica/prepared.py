@@ -7,31 +7,31 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, SolveError
+from gantrytau.border.units import given
 from gantrytau.describing.record import Record
 from gantrytau.flattening.shapes import elements_of
-from gantrytau.language.scales import given
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build, with_guesses
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
 from gantrytau_optimica.control.first_guesses.guesses import guess_of, number_guess
 from gantrytau_optimica.control.root_margins import with_margins
+from gantrytau_optimica.failures.end_closure import open_ends
+from gantrytau_optimica.failures.end_equilibrium import held_ends
 from gantrytau_optimica.failures.following_ends import contradicted, following_ends, without_following
-from gantrytau_optimica.failures.held_ends import held_ends
-from gantrytau_optimica.failures.open_ends import open_ends
 from gantrytau_optimica.failures.reach import out_of_reach, reach_text
 from gantrytau_optimica.failures.relaxation import worth_relaxing
-from gantrytau_optimica.given import parameter_names, read_guesses, solution_given
+from gantrytau_optimica.guesses_and_parameters import parameter_names, read_guesses, solution_given
 from gantrytau_optimica.policy import Guesses as GivenGuesses
 from gantrytau_optimica.refinement.attempts import Attempts, attempted, timed_solver
+from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.motions import as_motion, stopped_told
 from gantrytau_optimica.refinement.multistart import best_refined, searched
-from gantrytau_optimica.refinement.off_margins import off_margins
-from gantrytau_optimica.refinement.reached import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import refined, solved_by_arcs, without_ramps
+from gantrytau_optimica.refinement.root_regularisation import off_margins
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import NOT_BEGUN, Solver, SolverSettings, objective_size
-from gantrytau_optimica.solving.second_look import aside, beside_obstacles, places_aside
+from gantrytau_optimica.solving.saddle_escape import aside, beside_obstacles, places_aside
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe

@@ -10,7 +10,7 @@ from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArra
 from gantrytau.answers.many_points.elimination import eliminated, order_of_pivots, pivots_in_order
 from gantrytau.answers.many_points.followed_branches import FollowedBranch
 from gantrytau.answers.many_points.kept_unknowns import ReducedBranch, reduced
-from gantrytau.errors import ModelError, StructureError
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau_models import (
     DeltaRobot,
     FiveBar,

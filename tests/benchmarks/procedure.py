@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from gantrytau.kinematics import Box, Kinematics, Limits
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import CalibrationPlan, LaserTracker, Measurements, calibrate, plan_calibration
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import scales
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
+from gantrytau_optimica.calibration.links.arm_factors import scales
 from tests.benchmarks.table import Row, at_least, at_most, shown
 
 WANTED, TAPE = 50e-6, 0.005

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu import Experiment
 from gantrytau_fmu.building.platforms import PLATFORMS, native
 from tests.fmu.tiny_fmus import FMI2, lag2, pack, running3

@@ -102,5 +102,5 @@ def test_a_script_that_its_workers_would_repeat_is_told_what_to_write(tmp_path):
     found = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=240)
     assert found.returncode != 0
     assert found.stderr.splitlines()[-1].startswith(
-        "gantrytau.errors.GantryTauError: study: where='dask': found workers"
+        "gantrytau.border.refusal.GantryTauError: study: where='dask': found workers"
     )

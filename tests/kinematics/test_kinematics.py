@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Bounds, Start, translate
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, SixLinkWithWrist, prototypes
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.rotations import about, turned
 from gantrytau_models import F1GantryTau, prototypes

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import GantryTauError, Model, Real, Start, connect
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics import Kinematics, assembly_modes
 from gantrytau.kinematics.rotations import turned
 from gantrytau.mechanics.multibody import Body, FixedTranslation, PointMass, Prismatic, Revolute, World

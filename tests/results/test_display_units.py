@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, Result, si
-from gantrytau.language.tables.columns import Columns
+from gantrytau.border.columns import Columns
 
 matplotlib.use("Agg")
 

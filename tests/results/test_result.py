@@ -8,7 +8,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.border.refusal import GantryTauError, ModelError
 from gantrytau.results.result import Result
 from gantrytau.results.series import split_element
 

@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_fmu.building.platforms import PLATFORMS, Platform
 

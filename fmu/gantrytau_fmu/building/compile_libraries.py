@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from gantrytau.errors import GantryTauError, ModelError
+from gantrytau.border.refusal import GantryTauError, ModelError
 from gantrytau_fmu.building.platforms import Platform
 
 UNIT = "fmu.c"  # the one file that is compiled; it includes the others

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 
 
 @dataclass(frozen=True)

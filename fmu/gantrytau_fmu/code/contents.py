@@ -7,9 +7,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.dimensions import per_second
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import split_derivative
-from gantrytau.language.units import per_second
 from gantrytau_fmu.code.arrays import numbers_of
 from gantrytau_fmu.code.dependencies import Dependencies
 from gantrytau_fmu.code.formulas import Formulas

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.instructions import computed
 from gantrytau_fmu.code.operations import OPERATIONS
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.code.arrays import column, numbers_of
 
 HELD = 1e-9  # relative: a declared start that initialisation has kept

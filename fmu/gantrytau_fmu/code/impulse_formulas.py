@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import Substitution
+from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.events.impulses import Levels, turning
 from gantrytau_fmu.code.switching import WithModes

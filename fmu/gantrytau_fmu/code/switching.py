@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from gantrytau import Dae
-from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.pattern import Pattern
+from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.compiler.system import System
 from gantrytau.compiler.translated import solved
 from gantrytau.language.piecewise import Turn

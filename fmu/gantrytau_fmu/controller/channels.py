@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gantrytau.border.dimensions import dimension
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.units import dimension
 
 Values = NDArray[np.float64]
 LARGEST = 4096  # numbers in one declaration: a bound for whoever makes room for them

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import USERS_ERRORS, in_words
+from gantrytau.border.refusal import USERS_ERRORS, in_words
 from gantrytau_fmu.controller.channels import Declaration, Values
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.timing import ClientCounts

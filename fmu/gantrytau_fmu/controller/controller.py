@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import GantryTauError, ModelError, SolveError, did_you_mean
+from gantrytau.border.refusal import GantryTauError, ModelError, SolveError, did_you_mean
 from gantrytau.interruption import on_interrupt
 from gantrytau_fmu.controller.board import ACTIVATE, STATES, Board, State
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.board import STATES, State
 from gantrytau_fmu.controller.channels import Channel
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import USERS_ERRORS, ModelError, SolveError, in_words
 from gantrytau.describing.record import Record
-from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, in_words
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 

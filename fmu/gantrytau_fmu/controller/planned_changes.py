@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.sample_log import SampleLog
 
 Change = Callable[[SampleLog], None]

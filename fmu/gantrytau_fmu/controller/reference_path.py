@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau_fmu.controller.channels import Declaration, Values
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.stepped_part import SteppedPart

@@ -7,7 +7,7 @@ before and then asks again and again, which halves the lateness (measured on a s
 import time
 from collections.abc import Callable, Sequence
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau_fmu.controller.client_line import ClientLine
 
 POLLED = 0.6e-3  # s before a sample in which the wall clock does not sleep

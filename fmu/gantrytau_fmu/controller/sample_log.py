@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 
 ROWS = 1024  # made room for at first; then always twice as many

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError, told
+from gantrytau.border.refusal import ModelError, SolveError, told
 from gantrytau.results.series import split_element
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.systems.component import Component

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import astuple
 from math import isfinite
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.description import C_NAME, FmuDescription, FmuVariable, Unknown, Value
 
 LETTERS = r"(?:[A-Za-z_]\w*|'(?:[\w!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]|\\['\"?\\abfnrtv])+')"

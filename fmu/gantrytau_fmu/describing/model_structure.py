@@ -7,7 +7,7 @@ FMI 3.0.2, section 2.4.8; FMI 2.0.4, section 2.2.8. What is not known about depe
 from collections.abc import Collection, Set
 from dataclasses import replace
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.describing.description_checks import initial_of
 from gantrytau_fmu.description import FmuDescription, ModelStructure, Unknown
 

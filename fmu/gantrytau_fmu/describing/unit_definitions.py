@@ -6,9 +6,9 @@ FMI 3.0.2, sections 2.4.3 and 2.4.4; FMI 2.0.4, sections 2.2.2 and 2.2.3. The ra
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from gantrytau.errors import ModelError
-from gantrytau.language.scales import scale
-from gantrytau.language.units import BASE, dimension, radians
+from gantrytau.border.dimensions import BASE, dimension, radians
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import scale
 from gantrytau_fmu.describing.xml_text import element, parent
 from gantrytau_fmu.description import FmuVariable
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.building.platforms import native
 from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.inconsistencies import inconsistencies

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.description import FmuDescription, FmuInterface, FmuVariable, Value
 
 SHOWN = 12  # variables of a kind that the printed table lists

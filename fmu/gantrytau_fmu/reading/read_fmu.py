@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.description import (
     C_NAME,
     Experiment,

@@ -2,7 +2,7 @@
 
 from xml.parsers import expat
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 _DEPTH = 100  # of elements inside each other; readers recurse
 _ENCODINGS = (

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from io import BufferedReader, FileIO
 from pathlib import Path
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.reading.safe_xml import check_xml
 
 DESCRIPTION = "modelDescription.xml"

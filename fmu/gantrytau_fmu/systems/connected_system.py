@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gantrytau.errors import ModelError, did_you_mean
-from gantrytau.language.units import BASE, dimension
+from gantrytau.border.dimensions import BASE, dimension
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.systems.component import Component, Scalar, numeric
 from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError, did_you_mean
+from gantrytau.border.refusal import ModelError, SolveError, did_you_mean
 from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Samples
-from gantrytau.errors import USERS_ERRORS, ModelError
+from gantrytau.border.refusal import USERS_ERRORS, ModelError
+from gantrytau.border.units import given, scale
 from gantrytau.inputs.input_signal import with_course
-from gantrytau.language.scales import given, scale
 
 ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau.errors import InitializationError, SolveError
+from gantrytau.border.refusal import InitializationError, SolveError
 from gantrytau_fmu.systems.master import Master
 
 AGREEMENT = 1e-10  # relative to the largest of both values, and to one unit near zero

@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from gantrytau.errors import GantryTauError, InitializationError, SolveError
+from gantrytau.border.refusal import GantryTauError, InitializationError, SolveError
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.slave import Slave
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError
+from gantrytau.border.refusal import ModelError, SolveError
 from gantrytau_fmu.systems.connected_system import ConnectedSystem
 from gantrytau_fmu.systems.drives import Drive, between, knots_of
 from gantrytau_fmu.systems.step_order import is_sampled, takes_samples

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError
+from gantrytau.border.refusal import ModelError, SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
 from gantrytau.results.result import Result

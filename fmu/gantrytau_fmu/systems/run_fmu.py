@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import GantryTauError, ModelError, SolveError
+from gantrytau.border.refusal import GantryTauError, ModelError, SolveError
 from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack

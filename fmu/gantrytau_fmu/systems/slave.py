@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from gantrytau.errors import GantryTauError, InitializationError, ModelError, SolveError
+from gantrytau.border.refusal import GantryTauError, InitializationError, ModelError, SolveError
 from gantrytau_fmu.systems.component import Component, Scalar
 
 LAST = 12  # messages kept of the log

@@ -12,7 +12,7 @@ In each group a component comes after those that drive it; a loop is cut where t
 
 from collections.abc import Collection, Sequence
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, SignalLink
 

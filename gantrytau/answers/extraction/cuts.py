@@ -11,12 +11,12 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.function_through import Question, function_through, plain_function
-from gantrytau.compiler.alphabets import column, values_at
+from gantrytau.border.refusal import StructureError
 from gantrytau.compiler.blocks.pattern import block_pattern
 from gantrytau.compiler.blocks.solution import Block, SolvedBlocks
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.compiler.translated import Translated, carefully, solved
-from gantrytau.errors import StructureError
 from gantrytau.language.symbols import derivative_name, split_derivative
 
 ORDERS = {

@@ -23,11 +23,11 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.extraction.cuts import EVERYTHING, FOLLOWS, Cut, Strata
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat, translate_model
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, StructureError
 from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from gantrytau.answers.linear_systems.poles_and_zeros import in_s
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:

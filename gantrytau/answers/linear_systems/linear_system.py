@@ -17,8 +17,8 @@ from gantrytau.answers.linear_systems.poles_and_zeros import (
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
 from gantrytau.answers.linear_systems.system_files import record, save_system
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gantrytau.answers.linear_systems.discretisation import ramped
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 AT_ONCE = 4_000_000  # numbers in the matrices that are solved in one call
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from gantrytau.answers.linear_systems.discretisation import held
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 FINEST = 1000  # parts of the shortest period in which all instants must lie
 SAME = 1e-9  # relative: periods that differ less are one

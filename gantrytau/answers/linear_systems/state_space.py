@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_matrices, check_period
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Input, Output, Real
 from gantrytau.language.events import sampled
 from gantrytau.language.model import Model

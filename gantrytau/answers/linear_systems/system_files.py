@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.whole_files import replacing
 
 MATRICES = ("A", "B", "C", "D")

@@ -18,9 +18,9 @@ from gantrytau.answers.many_points.array_program import NotForArrays
 from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.answers.many_points.point_by_point import PointByPoint
 from gantrytau.answers.many_points.through_blocks import ThroughBlocks
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import ModelError
 
 FEW = 256  # points that are answered sooner one by one than arrays are made ready
 TOGETHER = 32768  # points whose unknowns stay in memory that is near

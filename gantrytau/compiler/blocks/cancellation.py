@@ -17,12 +17,12 @@ from typing import Any, cast
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.refusals import held_together
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.start_values import start_values
-from gantrytau.errors import InitializationError, StructureError
 from gantrytau.flattening.flat_model import FlatModel
 
 POINTS = 3

@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import StructureError
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import undetermined, without_inertia
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.start_values import StartValues
-from gantrytau.errors import StructureError
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.term_sizes import term_sizes
 

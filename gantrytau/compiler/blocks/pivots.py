@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution, values_at
+from gantrytau.compiler.symbol_spaces import Substitution, values_at
 
 COUNT = 12
 TRUSTED = 1e-3  # of a pivot at the start, relative to its row: with less it costs more than three digits

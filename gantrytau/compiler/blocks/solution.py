@@ -11,13 +11,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution
 from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pieces import in_pieces, solve_by_value
 from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.symbols import split_derivative
 

@@ -11,9 +11,9 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import column
+from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.start.balance import balance
-from gantrytau.errors import InitializationError
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.language.piecewise import switched, with_modes
 from gantrytau.language.term_sizes import term_sizes
 

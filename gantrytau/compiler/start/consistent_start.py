@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import casadi as ca
 
+from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.aliases import Reduced
-from gantrytau.compiler.alphabets import values_at
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues
-from gantrytau.errors import InitializationError
+from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel
 
 ROUNDS = 200  # in which delayed values are made those of the start

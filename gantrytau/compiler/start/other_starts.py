@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import given as in_si
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.translated import Translated
-from gantrytau.errors import ModelError
 from gantrytau.flattening.shapes import elements_of
 from gantrytau.language.events import mode_number
-from gantrytau.language.scales import given as in_si
 
 SAME = 1e-9  # relative, below which two starts of one symbol agree
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.errors import InitializationError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 
 

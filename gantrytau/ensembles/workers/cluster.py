@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from gantrytau.border.refusal import GantryTauError, ModelError
 from gantrytau.ensembles.cases import Case
-from gantrytau.ensembles.workers.parcels import pack, unpack
+from gantrytau.ensembles.workers.payloads import pack, unpack
 from gantrytau.ensembles.workers.worker import (
     LOST,
     Outcome,
@@ -19,7 +20,6 @@ from gantrytau.ensembles.workers.worker import (
     processors,
     receive,
 )
-from gantrytau.errors import GantryTauError, ModelError
 
 PATIENCE = 20.0  # s, in which a scheduler answers, and has workers
 

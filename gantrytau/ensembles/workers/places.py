@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from time import perf_counter
 from typing import Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.workers.cluster import on_cluster
 from gantrytau.ensembles.workers.processes import in_processes
 from gantrytau.ensembles.workers.worker import Outcome, Task, computed, here, processors, within_a_case
-from gantrytau.errors import ModelError, did_you_mean
 
 Place = str
 PROCESSES = "processes"

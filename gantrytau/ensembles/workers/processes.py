@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gantrytau.ensembles.cases import Case
-from gantrytau.ensembles.workers.parcels import pack, unpack
+from gantrytau.ensembles.workers.payloads import pack, unpack
 from gantrytau.ensembles.workers.worker import (
     LOST,
     ONE_THREAD,

@@ -13,10 +13,10 @@ from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from typing import Any
 
+from gantrytau.border.refusal import USERS_ERRORS, DoubtfulResult
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.digests import digest
-from gantrytau.ensembles.workers.parcels import pack, unpack
-from gantrytau.errors import USERS_ERRORS, DoubtfulResult
+from gantrytau.ensembles.workers.payloads import pack, unpack
 from gantrytau.progress import silent
 
 Task = Callable[[Case], Any]

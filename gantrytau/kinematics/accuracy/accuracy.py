@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.accuracy.joint_errors import JointErrors, joint_errors
 from gantrytau.kinematics.kinematics import Kinematics

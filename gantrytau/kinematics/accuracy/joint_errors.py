@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, shown

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, StructureError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
 from gantrytau.kinematics.modes.figures import draw_histogram, draw_modes, mode_scene

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, StructureError
+from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.kinematics.modes.link_crossings import PAIRS
 from gantrytau.kinematics.modes.study_coordinates import quadrics
 from gantrytau.kinematics.modes.study_roots import placed

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau.kinematics.modes.study_coordinates import STUDY, orthonormal, quadrics
 from gantrytau.kinematics.modes.study_tracking import Homotopy, track
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.modes.assembly_modes import assembly_modes
 from gantrytau.kinematics.poses import Poses, answered
 from gantrytau.kinematics.rods.closed_form import meeting

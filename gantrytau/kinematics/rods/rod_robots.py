@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.answers.many_points.elimination import solved
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.modes.link_crossings import crossings
 from gantrytau.kinematics.rods.closed_form import (
     InverseOfThreeLinks,

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import real
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Limits
 from gantrytau.language.self_description.appearance import Cloud, Shape

@@ -2,7 +2,7 @@
 
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.workspace.model_limits import ModelExaminer
 from gantrytau.kinematics.workspace.pose_limits import Examined, Examiner, Limits

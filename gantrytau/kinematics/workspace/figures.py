@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.workspace.cells import Cells
 from gantrytau.kinematics.workspace.pose_limits import REASONS
 from gantrytau.results.figures import check_suffix, finished

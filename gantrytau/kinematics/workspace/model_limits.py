@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, poses, shown
 from gantrytau.kinematics.workspace.obstacles import segment_distance

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.language.self_description.appearance import Ball, Cuboid, Shape, Stick
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, real, shown
 from gantrytau.kinematics.workspace.cells import Cells, axis_number, border

@@ -17,8 +17,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 
 Value = str | float | Sequence[float | str] | np.ndarray
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.units import scale
 from gantrytau.describing.describe import class_described, first_sentence
 from gantrytau.describing.described import Description, Listing
 from gantrytau.describing.short_values import array_words, cut, short
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.declarations import (
     Array,
     Bounds,
@@ -24,7 +25,6 @@ from gantrytau.language.declarations import (
     is_setting,
 )
 from gantrytau.language.events import Mode
-from gantrytau.language.scales import scale
 from gantrytau.language.self_description.placed_parts import NUMBERS, PlacedPart, in_si, number_of
 
 HEADINGS = {  # kind of a quantity -> heading, in the order in which they are told

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
+from gantrytau.border.units import given
 from gantrytau.language.declarations import Array, Bounds, Formula, Parameter, Start, evaluate
-from gantrytau.language.scales import given
 
 NUMBERS = {"start", "min", "max", "nominal"}  # attributes in the unit of their quantity
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass, fields
 from types import FunctionType
 from typing import Any
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 
 
 @dataclass(frozen=True)

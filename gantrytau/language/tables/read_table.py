@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
-from gantrytau.language.tables.columns import Columns, is_number, split_heading
+from gantrytau.border.columns import Columns, is_number, split_heading
+from gantrytau.border.refusal import ModelError
 
 
 def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[Any, np.ndarray]:

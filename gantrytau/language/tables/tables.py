@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Formula
 from gantrytau.language.symbols import note_range
 from gantrytau.language.tables.local_polynomials import interpolating, polynomials

@@ -7,11 +7,11 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from gantrytau.border.columns import Columns
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError, did_you_mean
 from gantrytau.language.model import Declared
 from gantrytau.language.settings import with_setting
-from gantrytau.language.tables.columns import Columns
 
 Robot = TypeVar("Robot", bound=Declared)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.parameter_files import read_toml
 from gantrytau.mechanics.urdf.urdf_file import Placement, UrdfTree
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 NOWHERE = (0.0, 0.0, 0.0)

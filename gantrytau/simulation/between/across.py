@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.singular_poses import Approach, Point
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 AWAY = 0.02  # distance from the pose, relative to that of the measure, at which the motion is left and taken up again
 FINER = 1e-3  # of the tolerance, between the three places: extrapolation enlarges errors some hundred times

@@ -10,7 +10,7 @@ import numpy as np
 
 from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 LOST = 1e-3  # of a state, or of its size: what an interval may lose by rates that were not seen
 ASIDE = 0.05  # the same beside the middle, where the rate of the cubic is one of third order

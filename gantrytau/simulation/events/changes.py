@@ -10,8 +10,8 @@ from itertools import product
 
 import numpy as np
 
-from gantrytau.errors import SolveError
-from gantrytau.simulation import run_ends
+from gantrytau.border.refusal import SolveError
+from gantrytau.simulation import simulation_errors as run_ends
 from gantrytau.simulation.between.chatter import HOP, Chatter
 from gantrytau.simulation.events.crossings import at_zero, location_errors
 from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
@@ -21,7 +21,7 @@ from gantrytau.simulation.events.sticking import HOLDS, WHENS
 from gantrytau.simulation.events.time_events import TimeEvents
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.singular_poses import Point
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
 LONGEST_CIRCLE = 100  # choices of modes of which one leads to the next

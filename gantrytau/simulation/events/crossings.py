@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.singular_poses import Point
 

@@ -16,8 +16,8 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution, column
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.simulation.events.modes import InModes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 
 SAME = 1e-9  # of the shortest period, below which two times are one: 0.1 + 0.2 is not 0.3
 MOST = 10_000_000  # instants of one simulation

@@ -13,7 +13,7 @@ from gantrytau.simulation.events.crossings import Crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.events.phases import SHARE, moved, phases_along
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 STEPS_BETWEEN = 8  # of the integrator between two looks: more, and they are laid closer
 AHEAD = 50  # intervals that are divided as well

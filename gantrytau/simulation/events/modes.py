@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from gantrytau.compiler.alphabets import Substitution, column, values_at
 from gantrytau.compiler.index_reduction import Key
+from gantrytau.compiler.symbol_spaces import Substitution, column, values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.piecewise import Switched, Turn, switched, with_modes
 from gantrytau.simulation.events.poles import without_poles

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import Substitution, column
+from gantrytau.compiler.symbol_spaces import Substitution, column
 from gantrytau.compiler.translated import Translated
 from gantrytau.flattening.flat_model import When
 from gantrytau.flattening.whens import one_round

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.alphabets import column
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import translate_flat
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, When

@@ -9,11 +9,11 @@ from bisect import bisect_left, insort
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.memory.hermite import quintic, shifted, values_and_rates
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.time_grid import Trail
 
 SMOOTH = 6  # delays behind a kink the solution has so many derivatives more
 SAME = 1e-10  # of the shortest delay: two times are one

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.compiled import compiled
-from gantrytau.simulation.sampling.passage import Passage, passage
+from gantrytau.simulation.sampling.sampling_interval import Passage, passage
 
 CALLS = (1, 8, 64, 512, 4096)  # passages in one call
 LONGEST_CALL = 40_000_000  # instructions: some tenths of a second, for which Ctrl-C has to wait

@@ -6,14 +6,14 @@ Where the explicit method needs too many steps, or something switches between tw
 import casadi as ca
 import numpy as np
 
-from gantrytau.errors import SolveError
+from gantrytau.border.refusal import SolveError
 from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import Margins
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.buffers import Passages, StepsTaken
-from gantrytau.simulation.sampling.passage import linear
 from gantrytau.simulation.sampling.runge_kutta import ORDER
-from gantrytau.simulation.trail import Trail
+from gantrytau.simulation.sampling.sampling_interval import linear
+from gantrytau.simulation.time_grid import Trail
 
 MOST = 256  # steps from place to place: with more, an implicit method is quicker, though it starts anew
 FIRST = 8  # passages in a first call, and times more in the next

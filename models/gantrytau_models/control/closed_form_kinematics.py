@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Array, Input, Model, Output, Parameter, Real, cross, dot, if_else, sqrt
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_models.mechanisms.gantry_tau import tool_ahead_of_carts
 from gantrytau_models.prototypes import Prototype
 

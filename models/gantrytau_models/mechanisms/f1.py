@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import ForceArrow
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Array, Model, Parameter, Real, connect, der, dot, norm_2, outer, require
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import Ball, ForceArrow, Slideway, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
 from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction

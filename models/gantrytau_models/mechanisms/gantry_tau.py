@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Slideway
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (

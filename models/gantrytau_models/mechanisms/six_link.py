@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from gantrytau import Array, Model, Real, StateSelect, connect
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Shape, Stick, Triad
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, World

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.failures.row_meanings import Meanings
+from gantrytau_optimica.failures.constraint_labels import Meanings
 from gantrytau_optimica.solving.curvature import FLAT, least_curvature
 from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program

@@ -9,12 +9,7 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.constraints import read_constraints
-from gantrytau_optimica.calibration.fitting.model_fits import fit_model
-from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
-from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.plausibility import Fitting, Misses, check_robot, misses_of
-from gantrytau_optimica.calibration.judging.verdicts import (
+from gantrytau_optimica.calibration.diagnostics.acceptance import (
     arms_in_frame,
     check_carts,
     check_count,
@@ -25,17 +20,22 @@ from gantrytau_optimica.calibration.judging.verdicts import (
     not_in_base,
     usable_rows,
 )
-from gantrytau_optimica.calibration.named.calibrate_by_names import calibrate_by_names, usable
-from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.calibration.rods.arm_closure import arms_of
-from gantrytau_optimica.calibration.rods.error_models import (
+from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
+from gantrytau_optimica.calibration.diagnostics.plausibility import Fitting, Misses, check_robot, misses_of
+from gantrytau_optimica.calibration.fitting.constraints import read_constraints
+from gantrytau_optimica.calibration.fitting.model_fits import fit_model
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
+from gantrytau_optimica.calibration.links.arm_closure import arms_of
+from gantrytau_optimica.calibration.links.error_models import (
     check_model,
     links_of_arms,
     nominal_links,
     six_links,
     started_linear,
 )
-from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods, read_nominal
+from gantrytau_optimica.calibration.links.nominal_rods import NominalRods, read_nominal
+from gantrytau_optimica.calibration.named.calibrate_by_names import calibrate_by_names, usable
+from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.fitting.finding import Finding
 
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from gantrytau import GantryTauError, Model, ModelError
 from gantrytau.kinematics import Kinematics
-from gantrytau_optimica.calibration.judging.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.diagnostics.fitted_rods import FittedRods
+from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.calibration.report.report import Reported
-from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 
 
 class Calibration(Reported, FittedRods):

@@ -24,8 +24,8 @@ from gantrytau_optimica.control.control_problem import (
     PointValue,
     Signal,
 )
+from gantrytau_optimica.control.first_guesses.duration_guess import at_pace
 from gantrytau_optimica.control.first_guesses.guesses import first_guesses, horizon, number_guess
-from gantrytau_optimica.control.first_guesses.pace import at_pace
 from gantrytau_optimica.control.input_rates import Rates, check_pieces, check_reached, input_rates, lifted
 from gantrytau_optimica.control.limits import check_symbols, limit_rows, with_limits
 from gantrytau_optimica.control.root_margins import with_margins

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.errors import did_you_mean
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.control.control_problem import Pieces
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem

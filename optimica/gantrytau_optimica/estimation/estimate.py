@@ -37,7 +37,7 @@ from gantrytau_optimica.estimation.weights import Weighing, Weights
 from gantrytau_optimica.policy import MeshKeywords, Policy, policy_of
 from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.refinement.attempts import LEAST_TIME
-from gantrytau_optimica.refinement.reached import INTERRUPTED, LATE, BestSoFar
+from gantrytau_optimica.refinement.incumbent import INTERRUPTED, LATE, BestSoFar
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import WORDS, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_jumps

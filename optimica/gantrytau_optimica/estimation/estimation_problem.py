@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Samples, der
-from gantrytau.errors import did_you_mean
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter, FlatVariable
 from gantrytau.flattening.shapes import check_shape, numpy_shape
 from gantrytau.language.model import Declared

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.failures.row_meanings import MEANING
+from gantrytau_optimica.failures.constraint_labels import MEANING
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribe

@@ -21,9 +21,9 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau_optimica.control.limits import bare_limit
-from gantrytau_optimica.failures.row_meanings import row_sizes
-from gantrytau_optimica.solving.attended import Watch, attended
+from gantrytau_optimica.failures.constraint_labels import row_sizes
 from gantrytau_optimica.solving.clock import Clock
+from gantrytau_optimica.solving.interruptible import Watch, attended
 from gantrytau_optimica.transcription.assemble import to_dm
 from gantrytau_optimica.transcription.program import Program
 

@@ -8,10 +8,10 @@ import casadi as ca
 import numpy as np
 
 from gantrytau_optimica.control.built import Built
+from gantrytau_optimica.failures.constraint_labels import Meanings, intervals, row_sizes, signal_words
 from gantrytau_optimica.failures.dependence import dependent_conditions
 from gantrytau_optimica.failures.kinks import WAY_OUT, kinks
 from gantrytau_optimica.failures.nonfinite import not_finite
-from gantrytau_optimica.failures.row_meanings import Meanings, intervals, row_sizes, signal_words
 from gantrytau_optimica.solving.ipopt import FAR, NOT_BEGUN, WORDS, Solution
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory

@@ -17,7 +17,7 @@ from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase, Signal
 from gantrytau_optimica.control.first_guesses.guesses import horizon
 from gantrytau_optimica.control.limits import known_states
-from gantrytau_optimica.failures.held_ends import speeds
+from gantrytau_optimica.failures.end_equilibrium import speeds
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
 STEPS = 25  # of Runge-Kutta's method while inputs are constant

@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.language.instructions import computed
 from gantrytau_optimica.control.built import Built, with_values
-from gantrytau_optimica.failures.row_meanings import signal_words
+from gantrytau_optimica.failures.constraint_labels import signal_words
 from gantrytau_optimica.problem.model_words import definition_words, motion_words
 from gantrytau_optimica.transcription.trajectory import Trajectory
 

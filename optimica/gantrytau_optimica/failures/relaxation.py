@@ -10,8 +10,8 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber
+from gantrytau_optimica.failures.constraint_labels import Meanings, intervals
 from gantrytau_optimica.failures.elastic import Elastic, Soft, soft_conditions
-from gantrytau_optimica.failures.row_meanings import Meanings, intervals
 from gantrytau_optimica.solving.ipopt import WORDS, Solution
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory

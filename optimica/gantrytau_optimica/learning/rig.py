@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Model, ModelError, Result, Samples, linearize, simulate, translate
+from gantrytau.border.refusal import StructureError
 from gantrytau.dae import Dae
-from gantrytau.errors import StructureError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.learning.pose_maps import PoseMap, StraightAxes
-from gantrytau_optimica.learning.readings import period_means, with_readings
-from gantrytau_optimica.learning.scatter import STILL, Scatter
+from gantrytau_optimica.learning.run_variation import STILL, Scatter
+from gantrytau_optimica.learning.sensor_noise import period_means, with_readings
 from gantrytau_optimica.learning.servo_loop import drive, servo_loop, unit_of
 
 TOLERANCE = 2e-4  # of a run: joints within 4 nm of an FMU at 1e-6 over four runs of learning, far below the noise of devices

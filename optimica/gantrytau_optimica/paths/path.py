@@ -25,8 +25,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
+from gantrytau.border.refusal import USERS_ERRORS
 from gantrytau.describing.record import Record
-from gantrytau.errors import USERS_ERRORS
 from gantrytau.language.declarations import Formula
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.paths.fitting import (

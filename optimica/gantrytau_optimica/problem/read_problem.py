@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, InitializationError, ModelError, Parameter, Samples, StructureError, translate
+from gantrytau.border.refusal import told
 from gantrytau.compiler.request import names
-from gantrytau.errors import told
 from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import write_out
@@ -35,13 +35,13 @@ from gantrytau_optimica.problem.problem_checks import (
     check_times,
 )
 from gantrytau_optimica.problem.problem_units import check_problem_units
+from gantrytau_optimica.problem.start_targets import with_told_starts
 from gantrytau_optimica.problem.symbolic_problem import (
     ConstraintRow,
     LinkedPaths,
     SymbolicPhase,
     SymbolicProblem,
 )
-from gantrytau_optimica.problem.told_starts import with_told_starts
 
 
 def read_problem(

@@ -13,11 +13,11 @@ from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.procedure.documents.files import plan_on_file, write_plan
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
-from gantrytau_optimica.procedure.fleet import build_fleet
+from gantrytau_optimica.procedure.monte_carlo import matched, placed
+from gantrytau_optimica.procedure.motion_planning.plan_motion import plan_motion
+from gantrytau_optimica.procedure.motion_planning.tours import Roadmap, find_tour
 from gantrytau_optimica.procedure.pose_plan import PlanBasis, PosePlan
-from gantrytau_optimica.procedure.trials import matched, placed
-from gantrytau_optimica.procedure.ways.plan_motion import plan_motion
-from gantrytau_optimica.procedure.ways.tours import Roadmap, find_tour
+from gantrytau_optimica.procedure.robot_samples import build_fleet
 
 
 class CalibrationPlan(PosePlan):

@@ -9,7 +9,7 @@ from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import turned
 from gantrytau.kinematics.workspace.pose_limits import REASONS
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.fleet import WIDER, Fleet
+from gantrytau_optimica.procedure.robot_samples import WIDER, Fleet
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 TRIED = {"three links": 1500, "six links": 1000, "turntables": 1000}  # poses; more hardly change the choice

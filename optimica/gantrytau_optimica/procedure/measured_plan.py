@@ -11,22 +11,22 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
-from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.design.identifiability import PoseArrays
-from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.tool_error import ToolError, tool_error
-from gantrytau_optimica.calibration.trust.calibration_verdict import (
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
     CalibrationVerdict,
     judge,
     told_by_tool,
     um,
 )
-from gantrytau_optimica.calibration.trust.cross_validation import CrossValidation
+from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation
+from gantrytau_optimica.calibration.calibration import Calibration
+from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.design.identifiability import PoseArrays
+from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
+from gantrytau_optimica.calibration.diagnostics.tool_error import ToolError, tool_error
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
-from gantrytau_optimica.procedure.trials import matched
+from gantrytau_optimica.procedure.monte_carlo import matched
 
 FAR = 0.02  # m and rad, by which actuators of a pose with the same number may be off
 AS_PLANNED = 1e-6  # m, of digits in poses.csv: nothing measures that well

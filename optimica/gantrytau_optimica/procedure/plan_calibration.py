@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
-from gantrytau.ensembles.each import each
+from gantrytau.ensembles.parallel_map import each
 from gantrytau.kinematics import Limits, workspace
 from gantrytau.kinematics.workspace.grid_spacing import checked_places
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
@@ -16,13 +16,7 @@ from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
 from gantrytau_optimica.procedure.candidates import Candidates, commanded, find_candidates
 from gantrytau_optimica.procedure.documents.files import check_folder
-from gantrytau_optimica.procedure.fleet import Fleet, build_fleet, check_home
-from gantrytau_optimica.procedure.plan_goal import PlanGoal
-from gantrytau_optimica.procedure.plan_verdict import PlanVerdict, decide
-from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
-from gantrytau_optimica.procedure.pose_plan import PlanBasis
-from gantrytau_optimica.procedure.stages import Progress, Stages, digest
-from gantrytau_optimica.procedure.trials import (
+from gantrytau_optimica.procedure.monte_carlo import (
     AVERAGED,
     Trial,
     Trials,
@@ -32,8 +26,14 @@ from gantrytau_optimica.procedure.trials import (
     simulated,
     with_obstacles,
 )
-from gantrytau_optimica.procedure.ways.known_ways import KnownWays
-from gantrytau_optimica.procedure.ways.ordering import Order, ordered
+from gantrytau_optimica.procedure.motion_planning.ordering import Order, ordered
+from gantrytau_optimica.procedure.motion_planning.path_cache import KnownWays
+from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict, decide
+from gantrytau_optimica.procedure.plan_goal import PlanGoal
+from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
+from gantrytau_optimica.procedure.pose_plan import PlanBasis
+from gantrytau_optimica.procedure.robot_samples import Fleet, build_fleet, check_home
+from gantrytau_optimica.procedure.stages import Progress, Stages, digest
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
 
 LARGEST_TAPE = 0.1  # m; what is larger was written in mm

@@ -8,10 +8,10 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_selection import Prediction, predict, select_poses
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.calibration.rods.arm_factors import scales
+from gantrytau_optimica.calibration.links.arm_factors import scales
 from gantrytau_optimica.procedure.candidates import Candidates
-from gantrytau_optimica.procedure.fleet import Fleet
 from gantrytau_optimica.procedure.plan_goal import PlanGoal
+from gantrytau_optimica.procedure.robot_samples import Fleet
 
 READINGS = 30  # of a device without a covariance of its own, from which its noise is estimated
 CRITERION = (

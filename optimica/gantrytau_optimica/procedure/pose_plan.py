@@ -9,13 +9,13 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.calibration.trust.calibration_verdict import um
 from gantrytau_optimica.procedure.candidates import Candidates
-from gantrytau_optimica.procedure.fleet import WIDER, Fleet
-from gantrytau_optimica.procedure.plan_verdict import PlanVerdict
+from gantrytau_optimica.procedure.monte_carlo import Trials
+from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import PoseChoice
-from gantrytau_optimica.procedure.trials import Trials
+from gantrytau_optimica.procedure.robot_samples import WIDER, Fleet
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 USUAL = 20  # robots that are drawn

@@ -7,7 +7,7 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits, Workspace, workspace
 from gantrytau_optimica.calibration.devices.devices import Device
-from gantrytau_optimica.procedure.fleet import Fleet
+from gantrytau_optimica.procedure.robot_samples import Fleet
 
 SETTLED = 0.02  # of the volume, and of that part of it which the device sees
 FINER = 1.5  # times more cells along each axis in each round

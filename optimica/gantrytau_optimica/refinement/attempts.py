@@ -9,7 +9,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
-from gantrytau_optimica.refinement.reached import BestSoFar
+from gantrytau_optimica.refinement.incumbent import BestSoFar
 from gantrytau_optimica.solving.assembly import jumps, solved_assembled
 from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Pressed, Solution, Solver, SolverSettings

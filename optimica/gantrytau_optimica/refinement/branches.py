@@ -9,8 +9,8 @@ import numpy as np
 
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.control_problem import Phase
-from gantrytau_optimica.refinement.bends import coordinates
 from gantrytau_optimica.refinement.features import distinctions
+from gantrytau_optimica.refinement.guess_family import coordinates
 
 SAME = 1e-3  # relative: objectives that are closer may be of one branch
 SAME_COARSE = 1e-2  # the same on different meshes

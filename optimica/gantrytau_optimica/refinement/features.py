@@ -15,7 +15,7 @@ from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.ranges import measured
 from gantrytau_optimica.answers.playback.switches import sides
 from gantrytau_optimica.control.limits import signal_limits
-from gantrytau_optimica.refinement.bends import coordinates, vector_of
+from gantrytau_optimica.refinement.guess_family import coordinates, vector_of
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
 SAMPLES = 201  # of a motion

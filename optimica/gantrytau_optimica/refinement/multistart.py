@@ -10,16 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from gantrytau.ensembles.each import each
+from gantrytau.ensembles.parallel_map import each
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.control.first_guesses.guesses import with_algebraics
 from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.refinement.attempts import Attempts
-from gantrytau_optimica.refinement.bends import bends
 from gantrytau_optimica.refinement.branches import SAME, Search, SolutionBranch, joined, ranked
-from gantrytau_optimica.refinement.reached import LATE, BestSoFar
+from gantrytau_optimica.refinement.guess_family import bends
+from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.refinement import without_ramps
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh

@@ -12,7 +12,7 @@ from gantrytau_optimica.answers.playback.switches import switches as switches_of
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces, Signal
 from gantrytau_optimica.failures.following_ends import without_following
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
-from gantrytau_optimica.refinement.reached import LATE, BestSoFar
+from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh

@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.solving.attended import Watch, attended
 from gantrytau_optimica.solving.clock import Clock, Progress
+from gantrytau_optimica.solving.interruptible import Watch, attended
 from gantrytau_optimica.transcription.program import Program, first_guess
 
 WORDS = {

@@ -6,7 +6,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from gantrytau import ModelError, SolveError
-from gantrytau.errors import USERS_ERRORS, did_you_mean
+from gantrytau.border.refusal import USERS_ERRORS, did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Problem, prepare_with
 from gantrytau_optimica.policy import TranscriptionKeywords, policy_of

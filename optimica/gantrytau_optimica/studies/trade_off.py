@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.studies.figures import draw, write
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from gantrytau import read_toml
+from gantrytau.border.schema import Value, read_table
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import UP
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.calibration.devices.devices import numbers
-from gantrytau_optimica.procedure.cells.toml_values import Value, read_table
 from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray

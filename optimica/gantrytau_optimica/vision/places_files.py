@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.language.tables.columns import Columns
+from gantrytau.border.columns import Columns
 from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray

@@ -13,15 +13,15 @@ from typing import Literal
 import numpy as np
 
 from gantrytau.describing.record import Record
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import CalibrationVerdict
+from gantrytau_optimica.calibration.assessment.cross_validation import cross_validate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.calibration.devices.cameras import Cameras
-from gantrytau_optimica.calibration.trust.calibration_verdict import CalibrationVerdict
-from gantrytau_optimica.calibration.trust.cross_validation import cross_validate
 from gantrytau_optimica.procedure.cells.planned_cell import PlannedCell
-from gantrytau_optimica.procedure.fleet import Member, build_fleet
 from gantrytau_optimica.procedure.measured_plan import measured_plan
+from gantrytau_optimica.procedure.robot_samples import Member, build_fleet
 from gantrytau_optimica.vision.boards import Pattern
 from gantrytau_optimica.vision.comparison.compare import Comparison, compare
 from gantrytau_optimica.vision.detection.detect import detect

@@ -15,7 +15,7 @@ from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Measurements, calibrate, told_by_tool
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
-from gantrytau_optimica.calibration.judging.tool_error import tool_error
+from gantrytau_optimica.calibration.diagnostics.tool_error import tool_error
 from tests.commands.calibrate import cells
 
 FAULT, MISUSE = 1, 2

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.describing.description_checks import initial_of
 from gantrytau_fmu.describing.model_description import LOG_CATEGORIES, build_description, model_description
 from gantrytau_fmu.describing.xml_text import plain

@@ -10,7 +10,7 @@ from fmpy import read_model_description
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu import export_fmu
 from gantrytau_fmu.describing.model_description import model_description
 from gantrytau_fmu.describing.model_structure import written_structure

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gantrytau import simulate
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.rotations import turned
 from gantrytau_models import FiveDofGantryTau, SixLinkGantryTau, prototypes

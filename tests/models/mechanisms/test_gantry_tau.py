@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, translate
-from gantrytau.errors import InitializationError, StructureError
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.mechanics.translational import LinearFriction, TanhFriction
 from gantrytau_models import prototypes
 from gantrytau_models.mechanisms.gantry_tau import GantryTau

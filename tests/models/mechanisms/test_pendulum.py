@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import translate
-from gantrytau.errors import InitializationError
+from gantrytau.border.refusal import InitializationError
 from gantrytau_models.mechanisms.pendulum import Pendulum
 
 

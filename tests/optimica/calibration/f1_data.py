@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gantrytau_models import F1GantryTau, prototypes
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
-from gantrytau_optimica.calibration.rods.arm_poses import poses_of
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.references import f1
 
 DEVICE = 1e-5  # m, of a laser tracker, per axis

@@ -4,8 +4,8 @@ import numpy as np
 
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, read_arms
-from gantrytau_optimica.calibration.rods.arm_poses import poses_of
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, read_arms
+from gantrytau_optimica.calibration.links.arm_poses import poses_of
 
 
 def carts(arms: tuple[ArmClosure, ...], r: np.ndarray, R: np.ndarray) -> np.ndarray:

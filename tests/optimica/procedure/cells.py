@@ -7,8 +7,8 @@ import numpy as np
 from gantrytau.kinematics import Box, Limits
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import LaserTracker, TMac
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import scales
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
+from gantrytau_optimica.calibration.links.arm_factors import scales
 
 LOW, HIGH = np.array([0.6, 2.4, -3.0]), np.array([0.8, 2.5, -0.4])  # a post within the workspace of the L1
 RADIUS, CLEARANCE = 0.02, 0.02

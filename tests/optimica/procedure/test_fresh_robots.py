@@ -7,8 +7,8 @@ from gantrytau import ModelError
 from gantrytau.kinematics import Box, Limits
 from gantrytau_models import F1GantryTau, GantryTau, prototypes
 from gantrytau_optimica import LaserTracker, plan_calibration
-from gantrytau_optimica.procedure.fleet import WIDER, build_fleet, check_home
-from gantrytau_optimica.procedure.ways import clear_ways
+from gantrytau_optimica.procedure.motion_planning import clear_ways
+from gantrytau_optimica.procedure.robot_samples import WIDER, build_fleet, check_home
 from tests.families import NIGHTLY
 from tests.optimica.procedure import cells
 

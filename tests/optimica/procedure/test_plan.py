@@ -18,7 +18,7 @@ from gantrytau_optimica import (
     plan_calibration,
     stereo_cameras,
 )
-from gantrytau_optimica.procedure.ways.clear_ways import clear_ways
+from gantrytau_optimica.procedure.motion_planning.clear_ways import clear_ways
 from tests.optimica.procedure import cells
 from tests.optimica.procedure.cells import varied
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from gantrytau.ensembles import each as parts
+from gantrytau.ensembles import parallel_map as parts
 from gantrytau.kinematics import Capsule
 from gantrytau_optimica import plan_calibration
 from gantrytau_optimica.procedure import plan_calibration as planning
-from gantrytau_optimica.procedure.ways import known_ways
+from gantrytau_optimica.procedure.motion_planning import path_cache as known_ways
 from tests.families import first_of
 from tests.optimica.procedure import cells
 from tests.optimica.procedure.cells import varied

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, SolveError, der, sin
-from gantrytau.ensembles import each as parts
+from gantrytau.ensembles import parallel_map as parts
 from gantrytau_optimica import Free, Optimization, final, optimize
 from gantrytau_optimica.refinement import attempts
 from gantrytau_optimica.refinement.branches import PASSES, SolutionBranch, ranked

@@ -30,9 +30,9 @@ from gantrytau import (
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.sampling.buffers import Buffer
 from gantrytau.simulation.sampling.compiled import compiled
-from gantrytau.simulation.sampling.passage import linear, passage
 from gantrytau.simulation.sampling.runge_kutta import one_step
 from gantrytau.simulation.sampling.sampler import Sampler
+from gantrytau.simulation.sampling.sampling_interval import linear, passage
 from gantrytau_models import SixLinkGantryTau, prototypes
 from gantrytau_models.control.tracking import ControlledRobot
 from tests.simulation.sampled_models import Held

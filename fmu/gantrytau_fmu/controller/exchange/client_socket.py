@@ -4,7 +4,7 @@ import socket
 import time
 from collections.abc import Iterator
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.exchange.messages import (
     LARGEST,
     LENGTH,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 
 MAGIC = 0x5447  # "GT" in memory

@@ -5,7 +5,7 @@ import socket
 import time
 from threading import Lock
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.exchange.messages import (
     LARGEST,
     LENGTH,

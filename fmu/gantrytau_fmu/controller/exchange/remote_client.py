@@ -5,7 +5,7 @@ from collections import deque
 from threading import Lock
 from typing import Protocol
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Sample
 from gantrytau_fmu.controller.exchange.messages import NUMBERS, SEQUENCES, Message, MessageKind

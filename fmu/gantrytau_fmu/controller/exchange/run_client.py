@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.exchange.client_socket import AGAIN, ALIVE, ClientSocket, opened

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.board import STATES
 from gantrytau_fmu.controller.channels import Channel, Declaration
 from gantrytau_fmu.controller.clients import Client, Sample

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau.errors import ModelError
+from gantrytau.border.columns import TIMES, Columns
+from gantrytau.border.refusal import ModelError
 from gantrytau.inputs.samples import Samples
-from gantrytau.language.tables.columns import TIMES, Columns
 from gantrytau_fmu.controller.board import ACTIVATE
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.clients import Sample

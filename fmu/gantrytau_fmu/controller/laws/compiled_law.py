@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gantrytau.errors import ModelError, SolveError, did_you_mean
+from gantrytau.border.refusal import ModelError, SolveError, did_you_mean
 from gantrytau_fmu.controller.board import Board
 from gantrytau_fmu.controller.channels import Declaration, Values
 

@@ -5,8 +5,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
-from gantrytau.language.units import dimension
+from gantrytau.border.dimensions import dimension
+from gantrytau.border.refusal import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau_fmu.controller.board import Board
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.stepped_part import SteppedPart

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, cast
 
 from gantrytau import Dae, Model
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.laws.compiled_law import SUFFIXES, CompiledLaw
 from gantrytau_fmu.controller.laws.law import FunctionLaw, Law, LawFunction, PartLaw
 from gantrytau_fmu.controller.stepped_part import SteppedPart

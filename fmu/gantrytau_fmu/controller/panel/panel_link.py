@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau.errors import ModelError, did_you_mean
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau_fmu.controller.board import STATES
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.exchange.client_socket import AGAIN, ALIVE, opened

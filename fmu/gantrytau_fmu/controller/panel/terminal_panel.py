@@ -4,7 +4,7 @@ import threading
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.board import STATES
 from gantrytau_fmu.controller.panel.panel_link import PanelLink
 

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from gantrytau import Dae, Model
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.export import export_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.errors import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
+from gantrytau.border.refusal import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau_fmu.systems.component import Component, Scalar
 
 Function = Callable[[float, Mapping[str, Any]], Mapping[str, Any]]

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.reading.safe_xml import check_xml
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
 from gantrytau_fmu.reading.fmu_file import SHOWN
 from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-from gantrytau.errors import ModelError
+from gantrytau.border.refusal import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, Scalar, numeric, read_component

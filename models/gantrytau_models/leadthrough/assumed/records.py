@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.errors import ModelError
 from gantrytau_models.quantities import hold_numbers, quantities_of, quantity
 
 _FOLDER = Path(__file__).parent

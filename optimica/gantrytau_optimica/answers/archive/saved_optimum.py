@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Dae, ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.first_guesses.guesses import Stretched

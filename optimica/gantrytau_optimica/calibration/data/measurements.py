@@ -10,9 +10,9 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.columns import Columns
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
-from gantrytau.language.tables.columns import Columns
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.data.data_checks import check_data
 from gantrytau_optimica.fitting.finding import Finding

@@ -16,16 +16,16 @@ import numpy as np
 
 from gantrytau import Model, ModelError, StructureError
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import (
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.links.arm_factors import (
     NOISE,
     checked_poses,
     half_covariance,
     scales,
     triangle,
 )
-from gantrytau_optimica.calibration.rods.arm_poses import pose_rows
-from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.calibration.links.arm_poses import pose_rows
+from gantrytau_optimica.calibration.links.groups import TAPE
 
 NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
 TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.rods.arm_factors import NOISE
-from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.calibration.links.arm_factors import NOISE
+from gantrytau_optimica.calibration.links.groups import TAPE
 
 LEAST = (NOISE / TAPE) ** 2  # what a tape measure knows
 EXCHANGES = 1000  # one by one, at most

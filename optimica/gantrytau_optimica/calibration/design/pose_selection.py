@@ -28,10 +28,10 @@ from gantrytau_optimica.calibration.design.identifiability import (
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
 from gantrytau_optimica.calibration.fitting.pose_residuals import named_slopes
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import NOISE, checked_poses, scales
-from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, tool_gain
-from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.links.arm_factors import NOISE, checked_poses, scales
+from gantrytau_optimica.calibration.links.arm_poses import pose_rows, tool_gain
+from gantrytau_optimica.calibration.links.groups import TAPE
 
 Method = Literal["d-optimal", "tool", "condition", "random"]
 METHODS = ("d-optimal", "tool", "condition", "random")

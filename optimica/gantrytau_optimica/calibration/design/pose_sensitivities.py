@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import floats, real, shown, vectors
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses, measured_poses
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
-from gantrytau_optimica.calibration.rods.arm_poses import pose_rows, poses_of, tool_gain
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.links.arm_factors import checked_poses
+from gantrytau_optimica.calibration.links.arm_poses import pose_rows, poses_of, tool_gain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,9 +17,9 @@ from gantrytau import Model, ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure, Orientation, read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
-from gantrytau_optimica.calibration.rods.arm_poses import poses_of
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
+from gantrytau_optimica.calibration.links.arm_factors import checked_poses
+from gantrytau_optimica.calibration.links.arm_poses import poses_of
 
 STEP = 5e-5  # m, or without unit: that of Table 5.10
 

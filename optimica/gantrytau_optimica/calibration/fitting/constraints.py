@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 
 AT_LIMIT = 1e-7  # m, 1 or squares of these: nearer to a limit than this it holds the minimum back
 

@@ -16,10 +16,10 @@ from gantrytau_optimica.calibration.fitting.rod_fit import (
     fit_robust,
     with_prior,
 )
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
-from gantrytau_optimica.calibration.rods.arm_factors import checked_poses
-from gantrytau_optimica.calibration.rods.error_models import grouped, links_of_arm
-from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.links.arm_factors import checked_poses
+from gantrytau_optimica.calibration.links.error_models import grouped, links_of_arm
+from gantrytau_optimica.calibration.links.groups import TAPE
 
 
 @dataclass(frozen=True, eq=False)

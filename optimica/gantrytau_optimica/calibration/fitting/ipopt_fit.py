@@ -14,7 +14,7 @@ from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.least_squares import problem
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit, noise_of, not_held
 from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
-from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.calibration.links.groups import Group
 
 TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
 ROUNDED = 1e-6  # the same of closure errors of turntables, whose roundings leave 5e-7

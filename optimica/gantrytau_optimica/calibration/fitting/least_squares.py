@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum, gauss_newton
-from gantrytau_optimica.calibration.rods.closure import condense
-from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.calibration.links.closure import condense
+from gantrytau_optimica.calibration.links.groups import Group
 
 
 @dataclass(frozen=True)

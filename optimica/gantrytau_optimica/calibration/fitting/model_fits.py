@@ -14,8 +14,8 @@ from gantrytau_optimica.calibration.fitting.rod_fit import (
     not_held,
     with_prior,
 )
-from gantrytau_optimica.calibration.rods.closure import Chain
-from gantrytau_optimica.calibration.rods.error_models import (
+from gantrytau_optimica.calibration.links.closure import Chain
+from gantrytau_optimica.calibration.links.error_models import (
     COMMON,
     ModelLink,
     elements,
@@ -26,7 +26,7 @@ from gantrytau_optimica.calibration.rods.error_models import (
     parallel,
     started_linear,
 )
-from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.calibration.links.groups import Group
 
 ANOTHER_FRAME = (
     0.005  # rad, between nominal guideways and identified ones, from which on the frame is another

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.errors import did_you_mean
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.kinematics.rotations import told_vector
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
-from gantrytau_optimica.calibration.rods.arm_links import ArmLink
-from gantrytau_optimica.calibration.rods.closure import ALONG, OFFSET, PLATE, Chain
-from gantrytau_optimica.calibration.rods.error_models import COMMON
-from gantrytau_optimica.calibration.rods.forward import Guideway, RodLink
-from gantrytau_optimica.calibration.rods.nominal_rods import NominalRods
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.links.arm_links import ArmLink
+from gantrytau_optimica.calibration.links.closure import ALONG, OFFSET, PLATE, Chain
+from gantrytau_optimica.calibration.links.error_models import COMMON
+from gantrytau_optimica.calibration.links.forward import Guideway, RodLink
+from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
 
 
 class Named(Mapping[str, Any]):

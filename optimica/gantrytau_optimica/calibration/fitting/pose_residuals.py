@@ -18,8 +18,8 @@ from gantrytau.kinematics.rotations import left_jacobian, motion, of_vector, rot
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum, gauss_newton
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
-from gantrytau_optimica.calibration.rods.arm_factors import LEVER
-from gantrytau_optimica.calibration.rods.groups import TAPE
+from gantrytau_optimica.calibration.links.arm_factors import LEVER
+from gantrytau_optimica.calibration.links.groups import TAPE
 from gantrytau_optimica.fitting.robust import BISQUARE, OUTLIER, limit, robust_deviation, without_strays
 
 Array = np.ndarray

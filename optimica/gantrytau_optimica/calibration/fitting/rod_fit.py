@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.calibration.fitting.gauss_newton import RELATIVE, Minimum
 from gantrytau_optimica.calibration.fitting.least_squares import Problem, Taped, minimise, problem
-from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.calibration.links.groups import Group
 from gantrytau_optimica.fitting.robust import robust_deviation, without_strays
 
 FAR = 0.5  # m, from the start values; fits that data do not hold may run off further

@@ -6,10 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.calibration.rods.arm_closure import ArmClosure
-from gantrytau_optimica.calibration.rods.arm_links import ArmOverPoses
-from gantrytau_optimica.calibration.rods.closure import Chain
-from gantrytau_optimica.calibration.rods.groups import Group
+from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.links.arm_links import ArmOverPoses
+from gantrytau_optimica.calibration.links.closure import Chain
+from gantrytau_optimica.calibration.links.groups import Group
 
 
 def errors_of(group: Group, x: ca.MX) -> Iterator[ca.MX]:

@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import Dae, Model, ModelError, translate
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau.kinematics.model_functions import SPIN, orientations
-from gantrytau_optimica.calibration.rods.arm_factors import LEVER
+from gantrytau_optimica.calibration.links.arm_factors import LEVER
 
 Array = np.ndarray
 

@@ -9,10 +9,15 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.diagnostics.acceptance import (
+    check_count,
+    not_converged,
+    outliers,
+    usable_rows,
+)
 from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, started
 from gantrytau_optimica.calibration.fitting.rod_fit import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
-from gantrytau_optimica.calibration.judging.verdicts import check_count, not_converged, outliers, usable_rows
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
 

@@ -10,14 +10,14 @@ import numpy as np
 from gantrytau import Model
 from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.design.identifiability import dependencies
+from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
+from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.fitting.covariance import inverse_of, spread_by, undetermined
 from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.named_parameters import Named
 from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
-from gantrytau_optimica.calibration.judging.device_frames import Motion
-from gantrytau_optimica.calibration.judging.fitted_numbers import FittedNumbers
+from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.calibration.report.report import Reported
-from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
 
 Array = np.ndarray

@@ -8,7 +8,7 @@ import numpy as np
 from gantrytau import Description
 from gantrytau.describing.described import Listing
 from gantrytau.describing.short_values import cut
-from gantrytau_optimica.calibration.rods.error_models import COMMON, shared_name
+from gantrytau_optimica.calibration.links.error_models import COMMON, shared_name
 
 COLUMNS = ("name", "value", "standard deviation", "unit")
 LONG = 200  # letters of a list of names

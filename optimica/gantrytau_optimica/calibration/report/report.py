@@ -12,7 +12,7 @@ import numpy as np
 
 from gantrytau import Description, ModelError
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.judging.device_frames import Motion
+from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.report.described_calibration import calibration_described
 from gantrytau_optimica.calibration.report.report_page import html_report
 from gantrytau_optimica.calibration.report.residual_tests import residual_tests

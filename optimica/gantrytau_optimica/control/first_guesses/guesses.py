@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError, Result
-from gantrytau.errors import USERS_ERRORS
+from gantrytau.border.refusal import USERS_ERRORS
 from gantrytau.flattening.shapes import check_shape
 from gantrytau.language.symbols import derivative_name, split_derivative
 from gantrytau_optimica.control.built import Built

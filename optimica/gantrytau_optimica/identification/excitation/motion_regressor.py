@@ -14,9 +14,9 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.identification.friction.carried_mass import PLATE, driven_coordinates
 
 WORDS = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}

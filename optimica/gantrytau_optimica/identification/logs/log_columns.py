@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gantrytau import ModelError, did_you_mean
-from gantrytau.language.scales import USUAL, scale
+from gantrytau.border.units import USUAL, scale
 
 WORDS = {  # last part of a column's name, in small letters -> what it is
     **dict.fromkeys(("t", "time", "timestamp"), "t"),

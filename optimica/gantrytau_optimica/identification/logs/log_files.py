@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.language.tables.columns import SEPARATORS, check_cells, is_number, number_of
+from gantrytau.border.columns import SEPARATORS, check_cells, is_number, number_of
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.identification.logs.log_columns import EXPECTED, LogColumn, columns_of
 

@@ -13,7 +13,7 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau.describing.pages import page, table
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.rods.nominal_rods import with_numbers
+from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.rigid.robot_dynamics import expanded

@@ -21,7 +21,7 @@ from gantrytau_optimica.identification.rigid.chosen_parameters import (
     fixed_values,
     is_friction,
 )
-from gantrytau_optimica.identification.rigid.doubts import second_looks
+from gantrytau_optimica.identification.rigid.data_findings import second_looks
 from gantrytau_optimica.identification.rigid.fit_findings import (
     beside_robot,
     fit_findings,

@@ -16,11 +16,16 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.dae import Dae
-from gantrytau.errors import did_you_mean
 from gantrytau.flattening.flat_model import FlatParameter
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters
-from gantrytau_optimica.identification.rigid.many_rows import LEAST, MOST, of_columns, takes_columns
+from gantrytau_optimica.identification.rigid.vectorised_regressor import (
+    LEAST,
+    MOST,
+    of_columns,
+    takes_columns,
+)
 
 BLOCK = 1024  # rows of one call, as many as caches hold
 PUBLIC = {"cart_masses": "carts[{}].m", "link_masses": "arms[{}].link_mass"}  # words of the robots' records

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, did_you_mean, read_toml
+from gantrytau.border.columns import Columns
+from gantrytau.border.schema import Value, at, read_table
 from gantrytau.describing.record import Record
-from gantrytau.language.tables.columns import Columns
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.rig import Rig
+from gantrytau_optimica.learning.run_variation import Scatter
 from gantrytau_optimica.learning.runs.reference import Reference, square_reference
 from gantrytau_optimica.learning.runs.robot_runs import Plant
-from gantrytau_optimica.learning.scatter import Scatter
-from gantrytau_optimica.procedure.cells.toml_values import Value, at, read_table
 
 TEXT, NUMBER, TIME = Value("text"), Value("1"), Value("s", above=0.0)
 WHOLE, LENGTH = Value("whole", least=0), Value("m", above=0.0)

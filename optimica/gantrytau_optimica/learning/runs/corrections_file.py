@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.language.tables.columns import Columns
+from gantrytau.border.columns import Columns
 from gantrytau_optimica.learning.servo_loop import unit_of
 
 SAME = 1e-6  # of a period, by which times may differ

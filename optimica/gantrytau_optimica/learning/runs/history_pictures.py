@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.errors import did_you_mean
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.servo_loop import unit_of

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, Result
-from gantrytau.errors import USERS_ERRORS
+from gantrytau.border.refusal import USERS_ERRORS
 from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
 from gantrytau_optimica.learning.estimators.estimators import Actuators
 from gantrytau_optimica.learning.laws.learning import Learning, Stability

@@ -5,11 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from gantrytau import ModelError, Result, Samples
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
-from gantrytau.errors import did_you_mean
 from gantrytau_optimica.learning.pose_maps import PoseMap
-from gantrytau_optimica.learning.readings import with_readings
-from gantrytau_optimica.learning.scatter import STILL, Scatter
+from gantrytau_optimica.learning.run_variation import STILL, Scatter
+from gantrytau_optimica.learning.sensor_noise import with_readings
 
 Simulator = Callable[[Mapping[str, Samples], float], Result]
 Names = str | Sequence[str]  # of a vector, of a scalar where there is one, or of all elements

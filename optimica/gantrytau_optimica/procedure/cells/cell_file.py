@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau import GantryTauError, Model, ModelError, did_you_mean, kinematics, read_toml, with_setting
+from gantrytau.border.schema import Value, at, read_table
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.cameras import single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import Device, LaserTracker, TMac
-from gantrytau_optimica.procedure.cells.toml_values import Value, at, read_table
 from gantrytau_optimica.procedure.documents.rapid import check_program
 
 POINT = Value("m", ((3,),))

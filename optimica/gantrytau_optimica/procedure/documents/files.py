@@ -14,10 +14,10 @@ from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.documents.figures import draw_plan
 from gantrytau_optimica.procedure.documents.plan_page import html_page
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
-from gantrytau_optimica.procedure.plan_verdict import PlanVerdict
+from gantrytau_optimica.procedure.monte_carlo import Trials
+from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import CRITERION, PoseChoice
 from gantrytau_optimica.procedure.pose_plan import PosePlan
-from gantrytau_optimica.procedure.trials import Trials
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace
 
 KIND = "gantrytau calibration plan"

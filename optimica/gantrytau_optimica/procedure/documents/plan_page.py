@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau.describing.pages import page, table, verdict
-from gantrytau_optimica.calibration.trust.calibration_verdict import um
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan

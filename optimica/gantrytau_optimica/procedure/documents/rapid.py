@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.trust.calibration_verdict import um
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.errors import did_you_mean
+from gantrytau.border.refusal import did_you_mean
 from gantrytau_optimica.fitting.finding import rows_in_words
 from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.intrinsics import Camera

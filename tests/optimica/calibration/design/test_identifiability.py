@@ -11,7 +11,7 @@ from gantrytau import ModelError, StructureError
 from gantrytau_models import F1GantryTau, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, identifiability
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from tests.optimica.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
 from tests.optimica.calibration.linear_data import carts
 

@@ -11,9 +11,9 @@ from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.design.pose_exchange import _Choice
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict, select_poses
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
-from gantrytau_optimica.calibration.rods.arm_factors import scales
-from gantrytau_optimica.calibration.rods.arm_poses import poses_of
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
+from gantrytau_optimica.calibration.links.arm_factors import scales
+from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.optimica.calibration.f1_data import f1_arms, f1_poses
 from tests.optimica.calibration.linear_data import three_link_poses
 from tests.optimica.calibration.synthetic import grid

@@ -6,8 +6,8 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.design.sensitivity_table import sensitivity_table
-from gantrytau_optimica.calibration.rods.arm_closure import read_arms
-from gantrytau_optimica.calibration.rods.arm_poses import poses_of, tool_gain
+from gantrytau_optimica.calibration.links.arm_closure import read_arms
+from gantrytau_optimica.calibration.links.arm_poses import poses_of, tool_gain
 from tests.optimica.calibration.linear_data import carts, six_link_poses, three_link_poses
 
 LINKS = [

@@ -1,0 +1,80 @@
+"""Links that share numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from gantrytau.describing.record import Record
+from gantrytau_optimica.calibration.links.arm_links import ArmLink, ArmOverPoses
+from gantrytau_optimica.calibration.links.closure import Chain
+
+TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
+
+
+@dataclass(frozen=True)
+class Group(Record):
+    """Links and where in the vector x of the group their numbers stand.
+
+    x: start values (n,); names: of the numbers, (n,); free: which of them are identified; scale: what of each number moves
+    a joint by a metre; places: for each link the indices in x of its numbers; prior: value and deviation of numbers, by
+    index; noise: deviation of a closure error that decides what data hold, None where it is to be found from what is left;
+    tape: that of start values, m.
+    """
+
+    chains: tuple[Chain | ArmLink, ...]
+    places: tuple[np.ndarray, ...]
+    names: tuple[str, ...]
+    x: np.ndarray
+    free: np.ndarray
+    scale: np.ndarray
+    prior: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    noise: float | None = None
+    tape: float = TAPE
+
+    def numbers(self, k: int, x: np.ndarray) -> np.ndarray:
+        """The numbers of chain k."""
+        return x[self.places[k]]
+
+    def errors(self, x: np.ndarray) -> np.ndarray:
+        """Closure errors of all poses, (N, links), in m2, or in m where there are turntables."""
+        return np.column_stack([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
+
+    def slopes(self, x: np.ndarray, k: int) -> np.ndarray:
+        """Derivatives of the errors of chain k by the free numbers, (N, free)."""
+        whole = np.zeros((len(self.chains[k].q), len(x)))
+        whole[:, self.places[k]] = self.chains[k].slopes(x[self.places[k]])
+        return whole[:, self.free]
+
+    def started(self, x: np.ndarray) -> "Group":
+        """The same with other start values."""
+        return replace(self, x=x.copy())
+
+    def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "Group":
+        """The same links over other poses, q (N, n), r (N, 3), R (N, 3, 3)."""
+        arms: dict[int, ArmOverPoses] = {}
+        links: list[Chain | ArmLink] = []
+        for link in self.chains:
+            if isinstance(link, ArmLink):
+                key = id(link.poses)
+                arms.setdefault(key, ArmOverPoses(link.poses.arm, q, r, R))
+                links.append(ArmLink(arms[key], link.j))
+            else:
+                links.append(link.over(q, r, R))
+        return replace(self, chains=tuple(links))
+
+    def distances(self, x: np.ndarray) -> np.ndarray:
+        """Closure errors as differences of lengths, (N, links) in m."""
+        return np.column_stack([c.distance(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
+
+    @property
+    def arms(self) -> tuple[ArmOverPoses, ...]:
+        """The arms on turntables that these links hang on."""
+        found = {id(link.poses): link.poses for link in self.chains if isinstance(link, ArmLink)}
+        return tuple(found.values())
+
+    def squares(self, x: np.ndarray) -> np.ndarray:
+        """Squares of |y|^2 - L^2 of all poses, (N, links) in m4."""
+        arms = {id(arm): 2 * arm.arm.lengths for arm in self.arms}
+        factors = [arms[id(k.poses)][k.j] if isinstance(k, ArmLink) else 1.0 for k in self.chains]
+        return (self.errors(x) * factors) ** 2
