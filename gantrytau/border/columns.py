@@ -37,9 +37,6 @@ class Columns:
     rows: list[list[str]]
     separator: str
 
-    def __repr__(self) -> str:
-        return f"Columns: {len(self.rows)} rows of {', '.join(self.header)} in {self.path}"
-
     @classmethod
     def read(cls, path: str | PathLike[str], rows: str = "one line for each row") -> Self:
         """The table of a file, of one row at least; rows: what a row is, for messages.
