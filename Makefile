@@ -1,11 +1,12 @@
 # Two commands do everything on a machine with python3 (3.11 or newer) and make: make demo, make test.
+# make test takes ten minutes on two processors; make test-all adds the tests of tests/long_tests.txt.
 
 PYTHON ?= python3
 VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 LOCK := pyproject.toml constraints.txt
 
-.PHONY: demo test bench docs lint style types pytest clean
+.PHONY: demo test test-all bench docs lint style types pytest clean
 
 demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
@@ -15,8 +16,13 @@ test: style
 	$(MAKE) --no-print-directory --jobs=2 types pytest
 
 # Files in the order of tests/conftest.py, not those with the most tests first.
+PYTEST = OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+
 pytest: $(VENV)/installed-dev
-	OMP_NUM_THREADS=1 $(VENV)/bin/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+	$(PYTEST) --only=short
+
+test-all: test
+	$(PYTEST) --only=long
 
 bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks

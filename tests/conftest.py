@@ -2,6 +2,7 @@
 
 import gc
 import signal
+from collections import Counter
 from pathlib import Path
 
 import hypothesis
@@ -65,7 +66,43 @@ hypothesis.settings.register_profile(
 hypothesis.settings.load_profile("any machine")
 
 
+LONG_TESTS = TESTS / "long_tests.txt"
+LONG = 1.5  # s of one processor from which a test is a long one
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--only", choices=["short", "long"], help="tests that tests/long_tests.txt does not name, or does"
+    )
+    parser.addoption(
+        "--renew-long-tests", action="store_true", help="write tests/long_tests.txt from a run of all tests"
+    )
+
+
+def function_of(nodeid: str) -> str:
+    """A line of the list of long tests: a file, relative to this folder, and the function in it."""
+    return nodeid.partition("[")[0].removeprefix("tests/")
+
+
+def pytest_terminal_summary(terminalreporter, config: pytest.Config) -> None:
+    if config.getoption("renew_long_tests"):
+        seconds = Counter[str]()
+        for report in (report for reports in terminalreporter.stats.values() for report in reports):
+            if hasattr(report, "duration"):  # the set-up, the call or the end of a test
+                seconds[report.nodeid] += report.duration
+        LONG_TESTS.write_text(
+            "".join(f"{name}\n" for name in sorted({function_of(k) for k in seconds if seconds[k] > LONG}))
+        )
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if only := config.getoption("only"):
+        long = set(LONG_TESTS.read_text().split())
+        wanted = [(function_of(item.nodeid) in long) == (only == "long") for item in items]
+        config.hook.pytest_deselected(
+            items=[item for item, kept in zip(items, wanted, strict=True) if not kept]
+        )
+        items[:] = [item for item, kept in zip(items, wanted, strict=True) if kept]
     if not NIGHTLY:
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("nightly")])
         items[:] = [item for item in items if not item.get_closest_marker("nightly")]
