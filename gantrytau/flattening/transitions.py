@@ -124,7 +124,10 @@ def _sampled(
     instance: Instance,
     samplings: list[tuple[str, str, int, Sampling]],
 ) -> tuple[list[_Arrow], list[Any]]:
-    """The arrows with what opens them, and actions that bring up what was seen of those that are looked at every period."""
+    """Transitions with a period get a counter `due`, which a sampling raises, and open while it is above `seen`.
+
+    Returns all transitions, and the equations seen = due of the actions taken when a transition fires.
+    """
     timed = [a for a in arrows if a.said.period is not None]
     if not timed:
         return list(arrows), []

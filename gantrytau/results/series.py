@@ -254,7 +254,7 @@ class Series:
         return values
 
     def _attribute(self, texts: Mapping[str, str], name: str) -> str:
-        """The text of a name, else of the array it belongs to, of its first element or of what it equals."""
+        """The unit or description of a variable: its own, else that of its array, of its first element or of its alias."""
         if name in texts:
             return texts[name]
         if name in self._arrays:

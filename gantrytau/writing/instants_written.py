@@ -70,7 +70,10 @@ def at_instants(flat: FlatModel) -> tuple[AtInstants, ...]:
 def pieces_written(
     one: AtInstants, syntax: Syntax
 ) -> tuple[tuple[tuple[str, str], ...], tuple[list[str | Written], list[str | Written]]]:
-    """What its expressions share, as (name, expression); and its pieces and those of its note, words as they are."""
+    """Common subexpressions of a statement as (name, expression); then the written pieces of the statement and of its note.
+
+    Pieces of text are returned unchanged.
+    """
     graph, parts = Graph(), (one.says, one.note)
     with located(one.label):
         nodes = {id(p): _node(graph, p) for part in parts for p in part if isinstance(p, ca.SX | Truth)}

@@ -290,7 +290,7 @@ def _access(kind: str, version: int) -> str:
 
 
 def ended_in_words(log: Iterable[str], name: str) -> str:
-    """Why a component ended the run: what an FMU of ours says of it in its log, else that it did."""
+    """The reason why a component ended the run, from the log of its FMU; without one, the fact alone."""
     for line in reversed(list(log)):
         found = re.search(r"ended at time = [^:]* s: (.*)", line)
         if found:

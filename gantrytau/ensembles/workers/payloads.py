@@ -48,7 +48,7 @@ def pack(thing: Any) -> bytes:
 
 
 def unpack(parcel: bytes) -> Any:
-    """The thing that was packed, its expressions of the symbols of this process where they are of the time."""
+    """The object in a payload; the symbol of time in its expressions becomes the one of this process."""
     written, contents = pickle.loads(parcel)
     stream = ca.StringDeserializer(written)
     expressions = []

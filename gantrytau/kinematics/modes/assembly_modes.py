@@ -144,7 +144,7 @@ def _of_links(r, R, real, base, platform, diameter) -> dict:
 
 
 def _outcome(roots: Roots, real: np.ndarray) -> list[str]:
-    """What became of modes that are not there, and of those that are singular."""
+    """Messages about missing assembly modes (at infinity, lost, none real) and about singular ones."""
     found = []
     if roots.at_infinity:
         found.append(

@@ -244,7 +244,7 @@ class Rig:
         return self._started[key]
 
     def _drawn(self, forces: np.ndarray, random: np.random.Generator) -> dict[str, float]:
-        """Inputs of a run: level of friction, where it rests in it, and the forces that hold it there."""
+        """Inputs at the start of a run: friction level, position within the friction band, and holding forces."""
         n = len(self.joints)
         level = 1 + self.noise.level * random.uniform(-1, 1, n)
         rest = self.noise.rest * random.uniform(-1, 1, n)

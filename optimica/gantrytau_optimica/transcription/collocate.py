@@ -133,6 +133,7 @@ def _rows_at_points(
         Rows(kind, name, number, at_points + i, fractions, low, high, size)
         for i, (kind, name, low, high, size) in enumerate(meaning)
     ]
+    # the linear part of a row (element, point i, state) of the dynamics: sum_j D_ij x_j
     slopes = places.slopes(layout).tocoo()
     nx = max(len(phase.states), 1)
     row = (slopes.row // nx) * per_point + slopes.row % nx
@@ -157,8 +158,9 @@ def _rows_of_stretches(places: Places, layout: Layout, number: int, start: int) 
 
 def _point_term(places: Places, layout: Layout, path: list[Limit], start: int, total: int) -> Term:
     phase, run = layout.phase, running(places, layout)
-    slopes = phase.ode * (run.horizon * run.width)
-    values = ca.vertcat(slopes, phase.residuals, *(limit.expression for limit in path))
+    # the rest of these rows: - h f for the dynamics, g and c as they are
+    step_times_rate = phase.ode * (run.horizon * run.width)
+    values = ca.vertcat(step_times_rate, phase.residuals, *(limit.expression for limit in path))
     element, place = layout.points
     sizes = [*(-s.nominal for s in phase.states), *phase.residual_sizes, *(limit.size for limit in path)]
     factor = np.tile(1.0 / np.array(sizes), (element.size, 1))

@@ -80,7 +80,7 @@ def _by_data_alone(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
 def _held(
     constraint: ParameterConstraint, names: Sequence[str], x: np.ndarray, step: np.ndarray
 ) -> list[tuple]:
-    """Rows of a constraint that is reached: name, kind, slopes (n,), where it is held, where data want it, 0."""
+    """Active rows of a constraint: name, kind, gradient (n,), active bound, value of the unconstrained step, 0."""
     if constraint.squared:
         places = list(constraint.places)
         length = float(np.linalg.norm(x[places]))

@@ -1,4 +1,4 @@
-"""The nominal rods of a robot: what it says of them by name, with the numbers of its parameters."""
+"""The nominal links of a robot: joints and lengths by the names in its model, with the values of its parameters."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence

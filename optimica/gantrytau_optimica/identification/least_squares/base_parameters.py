@@ -19,7 +19,11 @@ SMALL = 1e-6  # of normed columns, a share that is rounding
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """Numbers of the columns that are determined, and of those that move with them by shares (i, d)."""
+    """Base parameters of a linear regression: the columns that data determine, and how they contain the others.
+
+    independent: (i,) indices of the determined columns; dependent: (d,) indices of the others;
+    shares: (i, d), the multiple of each dependent parameter within a base parameter.
+    """
 
     independent: np.ndarray
     dependent: np.ndarray
