@@ -16,6 +16,7 @@ from gantrytau.border.refusal import (
     StructureError,
     did_you_mean,
 )
+from gantrytau.border.schema import read_toml
 from gantrytau.border.units import in_unit, si
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.describe import describe
@@ -74,7 +75,7 @@ from gantrytau.language.functions import (
     tanh,
 )
 from gantrytau.language.model import Connector, Declared, Model, check_member, outer
-from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters, read_toml
+from gantrytau.language.parameter_files import parameter_text, parameters_of, read_parameters
 from gantrytau.language.settings import with_setting
 from gantrytau.language.statements import branch, connect, constraint, require, root
 from gantrytau.language.symbols import der, pre, split_derivative, time

@@ -5,6 +5,7 @@ import linecache
 import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 HINTS = {
@@ -123,6 +124,25 @@ def _index_in_words(error: BaseException) -> str:
         if "site-packages" not in frame.filename and written.endswith("]"):
             return f"`{written}` is {words}"
     return words
+
+
+def user_lines(error: BaseException | None, source: Path | None) -> list[str]:
+    """The lines of the user's file through which an error, or its cause, came: `robot.py, line 3: ...`."""
+    found: list[str] = []
+    while error is not None and source is not None:
+        if isinstance(error, SyntaxError) and error.filename == str(source):
+            found.append(f"{source.name}, line {error.lineno}: {(error.text or '').strip()}")
+        for frame in traceback.extract_tb(error.__traceback__):
+            if frame.filename == str(source):
+                found.append(f"{source.name}, line {frame.lineno}: {frame.line}")
+        error = error.__cause__
+    return list(dict.fromkeys(found))
+
+
+def python_error(error: BaseException, lines: list[str]) -> str:
+    """The class and the message of a Python error, and the user's lines that led to it, the last one nearest."""
+    message = error.msg if isinstance(error, SyntaxError) else str(error)
+    return "\n  ".join([f"{type(error).__name__}: {message}".removesuffix(": "), *lines])
 
 
 def told(place: str, evaluate: Callable[[], Any], within: str | None = None) -> Any:

@@ -1,9 +1,11 @@
 """Values of a TOML file with the unit that they must have: numbers are SI, texts bring theirs, as "5 mm" or "40 deg"."""
 
 import math
+import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from gantrytau.border.refusal import ModelError, did_you_mean
@@ -141,6 +143,18 @@ def read_table(
         if name not in table:
             raise ModelError(f"{at(place, name)}: found nothing, expected {keys[name].expected()}")
     return {name: keys[name].read(at(place, name), found) for name, found in table.items()}
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """A file as TOML; ModelError if that is not possible."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise ModelError(f"{file}: there is no such file; check its path") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ModelError(
+            f'{file}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
+        ) from error
 
 
 def at(place: str, name: str) -> str:

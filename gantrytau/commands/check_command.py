@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 import typer
 
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.printing.reporting import FAULT, as_json, busy, fail, reporting

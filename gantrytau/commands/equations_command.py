@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import did_you_mean
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.arguments.values import check_names, listed
+from gantrytau.commands.arguments.values import check_names
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, reporting, write_text
 from gantrytau.commands.printing.spelling import Spelling
 

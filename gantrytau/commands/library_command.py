@@ -10,9 +10,8 @@ import typer
 
 from gantrytau import Declared
 from gantrytau import describe as described
+from gantrytau.border import similar, source_of
 from gantrytau.commands.arguments import model_choice
-from gantrytau.commands.arguments.choice import source_of
-from gantrytau.commands.arguments.loading import similar
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import CommandError, as_json, note, reporting
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, ModelName, Picture, PrototypeName, Settings
-from gantrytau.commands.arguments.values import listed, number, split
+from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import as_json, busy, reporting, writable, writable_place
 from gantrytau.commands.printing.spelling import Spelling

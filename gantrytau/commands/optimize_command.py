@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gantrytau import GantryTauError, SolveError
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments import solver_options
-from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.display_option import Displayed, check_display, displayed
 from gantrytau.commands.arguments.model_choice import Chosen, Kind, build
 from gantrytau.commands.arguments.options import Json, Plotted, PrototypeName, Saved, Settings, To
 from gantrytau.commands.arguments.problem_name import ProblemName
 from gantrytau.commands.arguments.saved_results import FORMATS, read_result
-from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing import optimum_summary, picture_output, result_output
 from gantrytau.commands.printing.reporting import (
     FAULT,

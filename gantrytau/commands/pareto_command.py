@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import flatten
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments import solver_options
-from gantrytau.commands.arguments.choice import source_of
 from gantrytau.commands.arguments.model_choice import Kind, build
 from gantrytau.commands.arguments.options import Json, Picture, PrototypeName, Settings
 from gantrytau.commands.arguments.problem_name import ProblemName
 from gantrytau.commands.arguments.saved_results import read_result
-from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import (
     FAULT,

@@ -6,7 +6,7 @@ import typer
 
 import gantrytau
 from gantrytau import DoubtfulResult, SolveError
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.display_option import Displayed, check_display, displayed, of_table
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import (
@@ -22,7 +22,7 @@ from gantrytau.commands.arguments.options import (
     To,
 )
 from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.arguments.values import check_names, listed, signal
+from gantrytau.commands.arguments.values import check_names, signal
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import as_json, busy, noted, reporting
 from gantrytau.commands.printing.spelling import Spelling

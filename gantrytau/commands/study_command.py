@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError
+from gantrytau.border import listed
 from gantrytau.commands.arguments.display_option import Displayed, displayed
 from gantrytau.commands.arguments.options import Json, Plotted, To
 from gantrytau.commands.arguments.shell_offers import words
 from gantrytau.commands.arguments.study_file import EXAMPLE, StudyFile, read_study
-from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import (
     INTERRUPTED,

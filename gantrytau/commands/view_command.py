@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.arguments.saved_results import read_result

@@ -1,12 +1,12 @@
-"""TOML files of parameters: modifications of a model, so that `Robot(**tomllib.loads(text))` has these values."""
+"""TOML files of parameters: modifications of a model, so that `Robot(**read_toml(file))` has these values."""
 
 import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gantrytau.border.refusal import ModelError
+from gantrytau.border.schema import read_toml
 from gantrytau.border.units import si
 
 OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
@@ -25,18 +25,6 @@ def read_parameters(file: Path) -> dict[str, Any]:
     if not found:
         raise ModelError(f"{file}: found no values, expected some, as m = 2.5")
     return found
-
-
-def read_toml(file: Path) -> dict[str, Any]:
-    """A file as TOML; ModelError if that is not possible."""
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise ModelError(f"{file}: there is no such file; check its path") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ModelError(
-            f'{file}: cannot be read as TOML ({error}); names as "arms[0].length" stand in quotes'
-        ) from error
 
 
 def parameters_of(file: Path) -> str | None:

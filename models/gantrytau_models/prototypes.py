@@ -16,7 +16,6 @@ Two kinds of robot: `Prototype` has three carts; `RotatingPrototype`, the F1, ha
 import dataclasses
 import functools
 import math
-import tomllib
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.schema import read_toml
 from gantrytau.describing.record import Record
 from gantrytau_models.quantities import (
     REMEDY,
@@ -240,7 +240,7 @@ class RotatingPrototype(_Robot):
 
 @functools.cache
 def _table(name: str) -> dict[str, Any]:
-    return tomllib.loads((_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    return read_toml(_FOLDER / f"{name}.toml")
 
 
 def _entry(name: str, keys: Sequence[str | int], unit: str) -> Any:

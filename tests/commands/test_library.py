@@ -3,7 +3,7 @@
 import pytest
 
 import gantrytau_models
-from gantrytau.commands.arguments.values import listed
+from gantrytau.border import listed
 from gantrytau.mechanics.multibody import Prismatic
 from gantrytau_models import prototypes
 

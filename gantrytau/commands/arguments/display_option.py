@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau.commands.arguments.values import listed
+from gantrytau.border import listed
 from gantrytau.commands.printing.reporting import CommandError
 
 if TYPE_CHECKING:

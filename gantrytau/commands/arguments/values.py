@@ -24,20 +24,6 @@ def split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-def listed(texts: list[str] | None) -> tuple[str, ...]:
-    """Names of a repeatable option, also several in one, separated by commas outside of brackets."""
-    found: list[str] = []
-    for text in texts or ():
-        depth, begin = 0, 0
-        for place, letter in enumerate(text):
-            depth += (letter in "([") - (letter in ")]")
-            if letter == "," and depth == 0:
-                found.append(text[begin:place])
-                begin = place + 1
-        found.append(text[begin:])
-    return tuple(name.strip() for name in found if name.strip())
-
-
 def number(option: str, name: str, text: str) -> Any:
     """A number, a truth value, a vector such as `[1, 2, 3]`, or a text with a unit; CommandError for all else."""
     try:

@@ -6,11 +6,10 @@ from typing import Annotated
 
 import typer
 
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
 from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.arguments.values import listed
 from gantrytau.commands.calibrate import calibration_files
 from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile

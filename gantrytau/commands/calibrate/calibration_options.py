@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gantrytau.commands.arguments.values import listed, number, split
+from gantrytau.border import listed
+from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError
 from gantrytau.commands.printing.spelling import Spelling
 

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau import did_you_mean, read_toml
-from gantrytau.commands.arguments.choice import Choice
-from gantrytau.commands.arguments.loading import load, similar
+from gantrytau.border import Named, load, similar
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing.reporting import CommandError, refusing
@@ -118,7 +117,7 @@ def _part(file: Path, text: str) -> Any:
     """A plant or a law: a file, a model, or what a Python file names."""
     if text.lower().endswith(FILES):
         return file.parent / text
-    choice = Choice.read(text)
+    choice = Named.read(text)
     if choice.file is None:
         return build(text).model
     found = _named(file, text)
@@ -159,7 +158,7 @@ def _place(file: Path, name: str, sends: Any) -> Any:
 
 def _named(file: Path, text: str) -> Any:
     """What a Python file beside this one names."""
-    choice = Choice.read(f"{file.parent.absolute() / text}")
+    choice = Named.read(f"{file.parent.absolute() / text}")
     if choice.file is None or not choice.name:
         raise CommandError(
             f"{file}: found '{text}', expected a Python file and a name in it, as cell.py:probe"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from gantrytau import SolveError
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import source_of
 from gantrytau.commands.arguments.options import Json, Picture
 from gantrytau.commands.estimate.estimate_file import EXAMPLE, EstimateFile, read_estimate
 from gantrytau.commands.estimate.estimated_values import own_names, set_values, values_text

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import did_you_mean, flatten
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
-from gantrytau.commands.arguments.values import check_names, listed
+from gantrytau.commands.arguments.values import check_names
 from gantrytau.commands.fmu import export_options
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from gantrytau import SolveError, did_you_mean
+from gantrytau.border import listed
 from gantrytau.commands.arguments.display_option import Displayed, displayed
 from gantrytau.commands.arguments.options import Inputs, Json, Plotted, Saved, Seed, To
-from gantrytau.commands.arguments.values import listed, number, signal, split
+from gantrytau.commands.arguments.values import number, signal, split
 from gantrytau.commands.fmu.fmu_info import is_system, present
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import (

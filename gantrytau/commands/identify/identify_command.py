@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gantrytau.commands.arguments.choice import source_of
+from gantrytau.border import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
 from gantrytau.commands.arguments.shell_offers import words

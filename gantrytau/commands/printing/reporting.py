@@ -4,7 +4,6 @@ import errno
 import math
 import os
 import sys
-import traceback
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -15,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from gantrytau import GantryTauError, heeding_interrupts
+from gantrytau.border import NotLoaded, python_error, user_lines
 from gantrytau.commands.printing.help_pages import tidy
 from gantrytau.commands.printing.spelling import Spelling
 
@@ -106,11 +106,11 @@ def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN
     """
     try:
         yield
-    except CommandError as error:
+    except (CommandError, NotLoaded) as error:
         told = isinstance(error.__cause__, GantryTauError)  # in the words of the library
         fail(spelling.words(str(error)) if told else str(error), MISUSE, json)
     except GantryTauError as error:
-        place = "".join(f"\n  {line}" for line in places(error, source)[-1:])
+        place = "".join(f"\n  {line}" for line in user_lines(error, source)[-1:])
         code = MISUSE if error.argument in spelling.options else FAULT
         fail(f"{spelling.of(error)}{place}", code, json, kind=type(error).__name__)
     except KeyboardInterrupt:
@@ -118,10 +118,10 @@ def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN
     except (SystemExit, typer.Exit):
         raise
     except Exception as error:
-        lines = places(error, source)
+        lines = user_lines(error, source)
         if not lines:
             raise
-        fail(in_words(error, lines), FAULT, json, kind=type(error).__name__)
+        fail(python_error(error, lines), FAULT, json, kind=type(error).__name__)
 
 
 @contextmanager
@@ -129,7 +129,7 @@ def refusing(beginning: str = "") -> Iterator[None]:
     """Errors of the toolkit inside mean that the command was called with something that it cannot use."""
     try:
         yield
-    except CommandError:
+    except (CommandError, NotLoaded):
         raise
     except GantryTauError as error:
         raise CommandError(f"{beginning}{error}") from error
@@ -164,25 +164,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [_finite(item) for item in value]
     return value
-
-
-def places(error: BaseException | None, source: Path | None) -> list[str]:
-    """The lines of the user's file through which an error, or what caused it, came: `robot.py, line 3: ...`."""
-    found: list[str] = []
-    while error is not None and source is not None:
-        if isinstance(error, SyntaxError) and error.filename == str(source):
-            found.append(f"{source.name}, line {error.lineno}: {(error.text or '').strip()}")
-        for frame in traceback.extract_tb(error.__traceback__):
-            if frame.filename == str(source):
-                found.append(f"{source.name}, line {frame.lineno}: {frame.line}")
-        error = error.__cause__
-    return list(dict.fromkeys(found))
-
-
-def in_words(error: BaseException, lines: list[str]) -> str:
-    """A Python error and the user's lines that led to it, the last one nearest."""
-    words = error.msg if isinstance(error, SyntaxError) else str(error)
-    return "\n  ".join([f"{type(error).__name__}: {words}".removesuffix(": "), *lines])
 
 
 @contextmanager

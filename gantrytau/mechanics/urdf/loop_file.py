@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
-from gantrytau.language.parameter_files import read_toml
+from gantrytau.border.schema import read_toml
 from gantrytau.mechanics.urdf.urdf_file import Placement, UrdfTree
 
 KINDS = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical")

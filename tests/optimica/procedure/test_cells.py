@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
+from gantrytau import ModelError, translate
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import (
@@ -72,6 +72,12 @@ def test_the_robot_may_be_given(tmp_path):
     file.write_text(own)
     cell = read_cell(file)
     assert type(cell.robot).__name__ == "Mine"
+    (tmp_path / "masses.py").write_text("PLATE = 9.0\n")  # a neighbour, which the file imports
+    with (tmp_path / "robots.py").open("a") as robots:
+        robots.write("from masses import PLATE\nmine = GantryTau(prototypes.L1, plate_mass=PLATE)\n")
+    for name in ("robots.py:mine", "GantryTau(L1, plate_mass=9)", "GantryTau(L1, plate_mass='9000 g')"):
+        (tmp_path / "other.toml").write_text(own.replace("robots.py:Mine", name))
+        assert translate(read_cell(tmp_path / "other.toml").robot).parameter_values["plate_mass"] == 9.0
     assert str(tmp_path) in cell.copied()  # found from any folder
 
 

@@ -1,12 +1,12 @@
 """Surfaces and people as frozen records, read from leadthrough/*.toml: `surfaces.METAL`, `operators.SKILLED`."""
 
 import functools
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gantrytau.border.refusal import ModelError
+from gantrytau.border.schema import read_toml
 from gantrytau.describing.record import Record
 from gantrytau_models.quantities import hold_numbers, quantities_of, quantity
 
@@ -61,7 +61,7 @@ class OperatorRecord(Record):
 def read(file: str, name: str) -> Any:
     """A record of surfaces.toml or operators.toml; ModelError for a unit that is not that of the record."""
     record = {"surfaces": SurfaceRecord, "operators": OperatorRecord}[file]
-    table = tomllib.loads((_FOLDER / f"{file}.toml").read_text(encoding="utf-8"))[name]
+    table = read_toml(_FOLDER / f"{file}.toml")[name]
     values = {}
     for item in quantities_of(record):
         entry = table[item.name]

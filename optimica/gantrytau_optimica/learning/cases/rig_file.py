@@ -1,8 +1,6 @@
 """`rig.toml`: a robot, what differs from run to run, a motion, and ways to learn it."""
 
 import importlib
-import runpy
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 
 from gantrytau import GantryTauError, ModelError, did_you_mean, read_toml
 from gantrytau.border.columns import Columns
+from gantrytau.border.named import named
 from gantrytau.border.schema import Value, at, read_table
 from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.tukey import Tukey
@@ -271,19 +270,14 @@ def _cases(whole: str, entries: Any, common: Mapping[str, Any]) -> tuple[CaseOfF
 
 def _own_plant(place: str, name: str, folder: Path) -> Plant:
     """What a Python file names: a plant, or a function that makes one."""
-    python, _, attribute = name.partition(":")
-    path = folder / python
     try:
-        sys.path.insert(0, str(folder.absolute()))  # what stands beside it can be imported, as in a script
-        found: Any = runpy.run_path(str(path))[attribute]
+        found: Any = named(name, folder, LIBRARY)
         found = found() if callable(found) and not hasattr(found, "run") else found
-    except (OSError, KeyError, ImportError, SyntaxError, TypeError) as error:
+    except (GantryTauError, TypeError) as error:
         raise ModelError(
-            f'{place}: found "{name}", which cannot be made ({error!r}), expected robot.py:rig, a plant or a function that '
+            f'{place}: found "{name}", which cannot be made ({error}), expected robot.py:rig, a plant or a function that '
             "makes one"
         ) from error
-    finally:
-        sys.path.remove(str(folder.absolute()))
     lacking = [word for word in ("run", "period", "kinematics") if not hasattr(found, word)]
     if lacking:
         raise ModelError(

@@ -1,14 +1,13 @@
 """`cell.toml`: a robot as the tape measure knows it, its surroundings, and the device that is to measure it."""
 
-import importlib
 import re
-import runpy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from gantrytau import GantryTauError, Model, ModelError, did_you_mean, kinematics, read_toml, with_setting
+from gantrytau.border.named import named
 from gantrytau.border.schema import Value, at, read_table
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
@@ -152,7 +151,7 @@ def read_cell(path: str | Path, robot: Robot | None = None) -> Cell:
                 f"{whole}found no table [{name}], expected one; `gantrytau calibrate --example` prints a whole file"
             )
     own = read_table(f"{whole}robot", table["robot"], ROBOT, ("model", "tape"))
-    name, values = named(own["model"], file), _values(f"{whole}values", table.get("values", {}))
+    name, values = absolute_name(own["model"], file), _values(f"{whole}values", table.get("values", {}))
     goal = read_table(f"{whole}goal", table["goal"], GOAL, ("error",))
     model = robot if isinstance(robot, Model) else _found(f"{whole}robot.model", name, robot or robot_by_name)
     device, frame = _device(f"{whole}device", table["device"])
@@ -172,7 +171,7 @@ def read_cell(path: str | Path, robot: Robot | None = None) -> Cell:
     )
 
 
-def named(model: str, file: Path) -> str:
+def absolute_name(model: str, file: Path) -> str:
     """The name of a model in any folder: files of models lie beside the file of the cell."""
     python, dot, rest = model.partition(".py")
     if not dot or Path(python).is_absolute():
@@ -181,17 +180,13 @@ def named(model: str, file: Path) -> str:
 
 
 def robot_by_name(name: str) -> Model:
-    """The model that a file names: `GantryTau(L1)`, `package.module:Robot`, `robot.py:Robot`; ModelError for none."""
-    found = re.fullmatch(r"(?:(?P<place>.+):)?(?P<name>\w+)(?:\((?P<prototype>\w+)\))?", name.strip())
+    """The model that a file names: `GantryTau(L1, plate_mass=9)`, `package.module:Robot`, `robot.py:Robot`.
+
+    Raises ModelError where there is none.
+    """
     try:
-        if found is None:
-            raise ValueError("a name is written as module:Class(prototype)")
-        place, prototype = found["place"] or LIBRARY, found["prototype"]
-        held = runpy.run_path(place) if place.endswith(".py") else vars(importlib.import_module(place))
-        made = held[found["name"]]
-        if isinstance(made, type):
-            made = made(getattr(held["prototypes"], prototype)) if prototype else made()
-    except (ImportError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        made = named(name, Path.cwd(), LIBRARY)
+    except (GantryTauError, AttributeError, TypeError) as error:
         raise ModelError(
             f"found '{name}', which cannot be made ({error}), expected a model; give it itself, robot="
         ) from error
