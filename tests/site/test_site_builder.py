@@ -170,7 +170,7 @@ def test_links_between_pages_of_folders_lead_to_pages_of_the_site(tmp_path):
 def test_every_page_of_a_folder_is_on_the_site():
     folders = ("gantrytau", "models", "optimica", "fmu", "notebooks", "tests")
     pages = [page for folder in folders for page in (ROOT / folder).rglob("*.md")]
-    assert set(pages) | {ROOT / "README.md", ROOT / "CHANGELOG.md"} == {
+    assert {*pages, *(ROOT / f"{page}.md" for page in ("README", "CONTRIBUTING", "CHANGELOG"))} == {
         path for path in handwritten() if path.suffix == ".md"
     }
 

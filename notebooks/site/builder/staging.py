@@ -26,8 +26,10 @@ MANUAL = {  # page of a folder -> page of the site
     "fmu/PROTOCOL.md": "manual/protocol.md",
     "notebooks/README.md": "notebooks/index.md",
     "tests/README.md": "manual/tests.md",
+    "CONTRIBUTING.md": "manual/contributing.md",
     "CHANGELOG.md": "manual/changelog.md",
 }
+UNSEARCHED = {"manual/changelog.md"}  # names everything, and explains nothing
 GENERATED = ("reference", "messages", "thesis", "command_line")  # folders of pages that nobody writes
 LINK = re.compile(  # or code, in which nothing is one
     r"^```.*?^```|(!?\[(?:`[^`\n]*`|[^\]`])*\]\()([^)\s]+)(\))|`[^`\n]+`", re.MULTILINE | re.DOTALL
@@ -83,7 +85,8 @@ def stage_handwritten(stage: Stage) -> None:
     for path, page in pages.items():
         if path.suffix == ".md":
             text = relinked(path.read_text(encoding="utf-8"), path, page, stage)
-            stage.write(page, _with_names(text) + _tree_of(page))
+            head = "---\nnosearch: true\n---\n" if page in UNSEARCHED else ""
+            stage.write(page, head + _with_names(text) + _tree_of(page))
 
 
 def relinked(text: str, source: Path, page: str, stage: Stage) -> str:
