@@ -1,10 +1,10 @@
 """What people hand in: refusals, checks, units, tables, files of settings and names, the same at every border."""
 
-from gantrytau.border.named import Named, NotLoaded, import_by_name, listed, load, similar, source_of
+from gantrytau.border.named import NamedObject, NotLoaded, import_by_name, listed, load, similar, source_of
 from gantrytau.border.refusal import python_error, user_lines
 
 __all__ = [
-    "Named",
+    "NamedObject",
     "NotLoaded",
     "import_by_name",
     "listed",

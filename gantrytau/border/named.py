@@ -25,7 +25,7 @@ class NotLoaded(ModelError):
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedObject:
     """The name of a class or an instance, its file if it is in one, and its arguments as they were written."""
 
     name: str
@@ -33,7 +33,7 @@ class Named:
     arguments: tuple[str, ...]
 
     @staticmethod
-    def read(text: str, folder: Path | None = None) -> "Named":
+    def read(text: str, folder: Path | None = None) -> "NamedObject":
         """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`, `robot.urdf`.
 
         folder: the one that paths are relative to; None for the current one.
@@ -43,7 +43,7 @@ class Named:
         found = _PYTHON.fullmatch(place) or _URDF.fullmatch(place)
         file = Path(folder or "", found["file"]).absolute() if found else None
         name = (found["name"] or "") if found else place.removeprefix("gantrytau_models.")
-        return Named(name.strip(), file, listed([arguments]))
+        return NamedObject(name.strip(), file, listed([arguments]))
 
     @property
     def module(self) -> str:
@@ -67,7 +67,7 @@ def named(text: str, folder: Path, library: str) -> Any:
     folder: that of the file; library: the module of names without one. Raises ModelError where there is no such object,
     or no such prototype or keyword; what the call raises passes.
     """
-    asked = Named.read(text, folder)
+    asked = NamedObject.read(text, folder)
     if asked.file is not None:
         module, name = load(asked.file), asked.name
     elif asked.module:
@@ -106,7 +106,7 @@ def _value(text: str) -> Any:
 
 def source_of(text: str) -> Path | None:
     """The file of the user that a text names, if it names one: itself, or as a module of the current folder."""
-    asked = Named.read(text)
+    asked = NamedObject.read(text)
     if asked.file or not asked.module:
         return asked.file
     file = Path(*asked.module.split(".")).with_suffix(".py").absolute()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau import Connector, Model, ModelError, check_member, parameters_of, read_parameters, with_setting
-from gantrytau.border import Named, import_by_name, load, similar, source_of
+from gantrytau.border import NamedObject, import_by_name, load, similar, source_of
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError, note, refusing
 
@@ -53,7 +53,7 @@ def build(
     text: str, prototype: str | None = None, settings: Sequence[str] = (), kind: Kind = MODEL
 ) -> Chosen:
     """The model that MODEL, `--prototype` and `--set` describe; CommandError with a remedy if there is none."""
-    choice = Named.read(text)
+    choice = NamedObject.read(text)
     wanted = _wanted(choice, text, prototype)
     if choice.file and choice.file.suffix.lower() == ".urdf":
         found = _in_urdf(choice.file, kind)
@@ -94,7 +94,7 @@ def _settings(settings: Sequence[str], prototype: str | None) -> Iterator[tuple[
             yield name, number("--set", name, value)
 
 
-def _wanted(choice: Named, text: str, prototype: str | None) -> str | None:
+def _wanted(choice: NamedObject, text: str, prototype: str | None) -> str | None:
     """The prototype that is named, in parentheses or by `--prototype`."""
     named = choice.prototypes
     if len(named) > 1:
@@ -106,7 +106,7 @@ def _wanted(choice: Named, text: str, prototype: str | None) -> str | None:
     return prototype or (named[0] if named else None)
 
 
-def _keywords(found: type[Model], choice: Named) -> dict[str, Any]:
+def _keywords(found: type[Model], choice: NamedObject) -> dict[str, Any]:
     """The keyword arguments in parentheses, checked against what the class takes."""
     values: dict[str, Any] = {}
     parameters = inspect.signature(found).parameters
@@ -163,7 +163,7 @@ def first_sentence(text: str | None) -> str:
     return inspect.cleandoc(text or "").partition("\n")[0]
 
 
-def _by_name(choice: Named, kind: Kind) -> Any:
+def _by_name(choice: NamedObject, kind: Kind) -> Any:
     """The class of a name: a model of the library, or a class by its full name, `package.module:Class`."""
     name, models = choice.name, library()
     if name in models:

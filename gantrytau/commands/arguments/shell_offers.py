@@ -11,7 +11,7 @@ from typing import Any
 import typer
 
 from gantrytau import Declared, Model, Parameter
-from gantrytau.border import Named
+from gantrytau.border import NamedObject
 from gantrytau.commands.arguments import model_choice
 
 Offers = list[tuple[str, str]]
@@ -105,4 +105,4 @@ def _model(ctx: typer.Context) -> type[Model] | None:
     """The class of the library that is on the command line already; an unfinished option leaves it among the rest."""
     library = model_choice.library()
     texts = [text for text in (ctx.params.get("model"), *ctx.args) if isinstance(text, str)]
-    return next((library[name] for text in texts if (name := Named.read(text).name) in library), None)
+    return next((library[name] for text in texts if (name := NamedObject.read(text).name) in library), None)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import did_you_mean, read_toml
-from gantrytau.border import Named, load, similar
+from gantrytau.border import NamedObject, load, similar
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.values import signal, with_unit
 from gantrytau.commands.printing.reporting import CommandError, refusing
@@ -120,7 +120,7 @@ def _with_units(place: str, first: str, last: str, count: int) -> list[str]:
 
 def _function(file: Path, text: str) -> Any:
     """The function of a Python file."""
-    choice = Named.read(text)
+    choice = NamedObject.read(text)
     if choice.file is None or not choice.name:
         raise CommandError(
             f"{file}: found function = '{text}', expected its file and name, as moves.py:fastest"

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau import did_you_mean, read_toml
-from gantrytau.border import Named, load, similar
+from gantrytau.border import NamedObject, load, similar
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing.reporting import CommandError, refusing
@@ -117,7 +117,7 @@ def _part(file: Path, text: str) -> Any:
     """A plant or a law: a file, a model, or what a Python file names."""
     if text.lower().endswith(FILES):
         return file.parent / text
-    choice = Named.read(text)
+    choice = NamedObject.read(text)
     if choice.file is None:
         return build(text).model
     found = _named(file, text)
@@ -158,7 +158,7 @@ def _place(file: Path, name: str, sends: Any) -> Any:
 
 def _named(file: Path, text: str) -> Any:
     """What a Python file beside this one names."""
-    choice = Named.read(f"{file.parent.absolute() / text}")
+    choice = NamedObject.read(f"{file.parent.absolute() / text}")
     if choice.file is None or not choice.name:
         raise CommandError(
             f"{file}: found '{text}', expected a Python file and a name in it, as cell.py:probe"

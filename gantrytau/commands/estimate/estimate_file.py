@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gantrytau import FlatModel, ModelError, did_you_mean, flatten, read_toml
-from gantrytau.border import Named
+from gantrytau.border import NamedObject
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.estimate.data_columns import Data
@@ -95,7 +95,7 @@ def read_estimate(file: Path) -> EstimateFile:
 
 def _beside(file: Path, text: str) -> str:
     """A model in a Python file is beside this one."""
-    return text if Named.read(text).file is None else f"{file.parent.absolute() / text}"
+    return text if NamedObject.read(text).file is None else f"{file.parent.absolute() / text}"
 
 
 def _check_keys(file: Path, place: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
