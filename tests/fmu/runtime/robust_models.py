@@ -212,7 +212,7 @@ def driver(model: str, name: str, *options: str) -> Path:
         return program.read_bytes()
 
     texts = {file.name: file.read_text() for folder in (sources, DRIVERS) for file in folder.glob("*.[ch]")}
-    program.write_bytes(binary(command, texts, make))
+    program.write_bytes(binary([*command, name], texts, make))
     program.chmod(0o755)
     return program
 
