@@ -213,6 +213,14 @@ def test_code_that_is_a_public_name_leads_to_the_reference(tmp_path):
     assert (folder / "manual/gantrytau.md").exists()
 
 
+def test_the_search_passes_over_the_changelog_alone(tmp_path):
+    stage_handwritten(Stage(tmp_path))
+    hidden = [
+        page for page in tmp_path.rglob("*.md") if page.read_text().startswith("---\nnosearch: true\n---\n")
+    ]
+    assert hidden == [tmp_path / "manual/changelog.md"]
+
+
 def test_every_module_has_a_task():
     assert len({group.file for group in listed_groups()}) == len(listed_groups())
 
