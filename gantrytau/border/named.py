@@ -26,7 +26,7 @@ class NotLoaded(ModelError):
 
 @dataclass(frozen=True)
 class NamedObject:
-    """The name of a class or an instance, its file if it is in one, and its arguments as they were written."""
+    """A class or an instance by name, with its file (None for a module) and its arguments as texts."""
 
     name: str
     file: Path | None
@@ -64,8 +64,8 @@ class NamedObject:
 def named(text: str, folder: Path, library: str) -> Any:
     """The object that a text in a file names; a class, or a function with arguments, is called with its arguments.
 
-    folder: that of the file; library: the module of names without one. Raises ModelError where there is no such object,
-    or no such prototype or keyword; what the call raises passes.
+    folder: that of the file; library: the module of names without one. Raises ModelError where there is no such object
+    or prototype; errors of the call itself are not caught.
     """
     asked = NamedObject.read(text, folder)
     if asked.file is not None:
@@ -97,15 +97,13 @@ def named(text: str, folder: Path, library: str) -> Any:
 def _value(text: str) -> Any:
     """A number, a vector or a truth value as Python writes them; else the text, which may bring a unit."""
     try:
-        return (
-            {"true": True, "false": False}.get(text) if text in ("true", "false") else ast.literal_eval(text)
-        )
+        return ast.literal_eval({"true": "True", "false": "False"}.get(text, text))
     except (ValueError, SyntaxError):
         return text
 
 
 def source_of(text: str) -> Path | None:
-    """The file of the user that a text names, if it names one: itself, or as a module of the current folder."""
+    """The Python file in a text such as `robot.py:Robot`, or of a module in the current folder; None for other names."""
     asked = NamedObject.read(text)
     if asked.file or not asked.module:
         return asked.file
@@ -146,7 +144,7 @@ def import_by_name(name: str, source: Path | None) -> ModuleType | None:
 
 @contextmanager
 def _loading(name: str, folder: Path, source: Path | None) -> Iterator[None]:
-    """While it lasts, modules of `folder` can be imported; what they print goes to stderr."""
+    """A context in which modules of `folder` can be imported, and print to stderr."""
     sys.path.insert(0, str(folder))
     try:
         with redirect_stdout(sys.stderr):

@@ -140,7 +140,7 @@ def user_lines(error: BaseException | None, source: Path | None) -> list[str]:
 
 
 def python_error(error: BaseException, lines: list[str]) -> str:
-    """The class and the message of a Python error, and the user's lines that led to it, the last one nearest."""
+    """The class and the message of a Python error, then the user's lines on the way to it, outermost first."""
     message = error.msg if isinstance(error, SyntaxError) else str(error)
     return "\n  ".join([f"{type(error).__name__}: {message}".removesuffix(": "), *lines])
 

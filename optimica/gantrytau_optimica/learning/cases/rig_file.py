@@ -273,7 +273,7 @@ def _own_plant(place: str, name: str, folder: Path) -> Plant:
     try:
         found: Any = named(name, folder, LIBRARY)
         found = found() if callable(found) and not hasattr(found, "run") else found
-    except (GantryTauError, TypeError) as error:
+    except (GantryTauError, ImportError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
         raise ModelError(
             f'{place}: found "{name}", which cannot be made ({error}), expected robot.py:rig, a plant or a function that '
             "makes one"

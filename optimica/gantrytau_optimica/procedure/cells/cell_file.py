@@ -186,7 +186,7 @@ def robot_by_name(name: str) -> Model:
     """
     try:
         made = named(name, Path.cwd(), LIBRARY)
-    except (GantryTauError, AttributeError, TypeError) as error:
+    except (GantryTauError, ImportError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
         raise ModelError(
             f"found '{name}', which cannot be made ({error}), expected a model; give it itself, robot="
         ) from error
