@@ -39,9 +39,12 @@ PROGRAMS = {  # used by name, not imported
     "ruff": "Makefile",
     "pytest-xdist": "Makefile",
     "furo": "notebooks/site/conf.py",
+    "hatch-fancy-pypi-readme": "pyproject.toml",
+    "hatchling": "tests/test_distribution.py",
     "ipykernel": "Makefile",
     "myst-nb": "notebooks/site/conf.py",
     "sphinx": "Makefile",
+    "twine": "tests/test_distribution.py",
     "ziglang": "fmu/gantrytau_fmu/building/compile_libraries.py",
 }
 LOADED = {"tbb": "ecospy"}  # a library that another distribution loads: named in pyproject.toml as such
@@ -124,6 +127,7 @@ def test_what_an_extra_installs_is_used(extra, distribution, used, used_by_tests
             "myst-nb": "myst_nb",
             "sphinx": "docs",
             "ipykernel": "docs",
+            "hatch-fancy-pypi-readme": "hooks.fancy-pypi-readme",
         }  # it builds pages
         assert words.get(str(distribution), str(distribution)) in text
         return
