@@ -5,8 +5,10 @@ import linecache
 import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 HINTS = {
     "truth value": "Python's if, and, or, max, chained comparisons and lists cannot work on symbols; use if_else, between, "
@@ -17,23 +19,53 @@ HINTS = {
     "casadi.vertcat(*list)",
 }
 
+# what code of users raises: its sys.exit ends the call, not the caller
+USERS_ERRORS = (Exception, SystemExit)
+LONGEST = 60  # characters of a value in a message
 
-USERS_ERRORS = (
-    Exception,
-    SystemExit,
-)  # what code of users raises: its sys.exit ends the call, not the caller
+
+@dataclass(frozen=True)
+class Given:
+    """An argument of a function with its value, or without: `loss='robust'` or `loss=` in Python, `--robust` in a shell."""
+
+    name: str
+    value: Any = ...
+
+    def __str__(self) -> str:
+        return f"{self.name}=" if self.value is ... else f"{self.name}={short(self.value)}"
 
 
 class GantryTauError(Exception):
     """Base class of all errors of this toolkit.
 
-    argument: the argument of the called function that is wrong, by name, where it is one. Messages write arguments as
-    Python does, `loss='robust'`; a command line, which has options instead, names its own by these.
+    parts: the message, in which an argument of the called function is a `Given`; place: the function or the path that is
+    wrong; found: the wrong argument with its value; argument: its name alone. The message is put together when it is
+    printed, `place: found loss='robst', expected 'linear' or 'robust'`, so that a command line can write its options.
     """
 
-    def __init__(self, message: str = "", *, argument: str | None = None):
-        super().__init__(message)
-        self.argument = argument
+    def __init__(
+        self, *parts: str | Given, place: str = "", found: Given | None = None, argument: str | None = None
+    ):
+        super().__init__(*parts)
+        self.parts = parts
+        self.place = place
+        self.found = found
+        self.argument = argument if found is None else found.name
+
+    def __str__(self) -> str:
+        place = f"{self.place}: " if self.place else ""
+        found = f"found {self.found}, " if self.found else ""
+        return place + found + self.words(str)
+
+    def words(self, write: Callable[[Given], str]) -> str:
+        """The message without its place and what was found, arguments in it as `write` gives them."""
+        return "".join(write(part) if isinstance(part, Given) else str(part) for part in self.parts)
+
+    def within(self, place: str) -> Self:
+        """The same error at a place that lies around its own."""
+        around = copy(self)
+        around.place = f"{place}: {self.place}" if self.place else place
+        return around
 
 
 class ModelError(GantryTauError):
@@ -50,8 +82,8 @@ class InitializationError(GantryTauError):
     residuals: what is left of the equations that do not hold, by name.
     """
 
-    def __init__(self, message: str, *, residuals: Mapping[str, float] | None = None):
-        super().__init__(message)
+    def __init__(self, *parts: str | Given, residuals: Mapping[str, float] | None = None, **facts: Any):
+        super().__init__(*parts, **facts)
         self.residuals = dict(residuals or {})
 
 
@@ -62,8 +94,8 @@ class SolveError(GantryTauError):
     result: the partial result, or None; optimum: the unfinished optimum of an optimisation, or None.
     """
 
-    def __init__(self, message: str, *, time=None, equations=(), result=None, optimum=None):
-        super().__init__(message)
+    def __init__(self, *parts: str | Given, time=None, equations=(), result=None, optimum=None, **facts: Any):
+        super().__init__(*parts, **facts)
         self.time: Any = time
         self.equations = tuple(equations)
         self.result: Any = result
@@ -79,6 +111,12 @@ class SolveError(GantryTauError):
 
 class DoubtfulResult(UserWarning):
     """A result holds values that are no numbers, or beyond all measure; the message names them and their first time."""
+
+
+def short(value: Any) -> str:
+    """A value as Python writes it, cut where it is long."""
+    text = repr(value.tolist() if hasattr(value, "tolist") else value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 
 def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
@@ -155,6 +193,6 @@ def told(place: str, evaluate: Callable[[], Any], within: str | None = None) -> 
     except GantryTauError as error:
         if within is not None and str(error).startswith((f"{within} (", f"{within}:", f"{within}.")):
             raise
-        raise type(error)(f"{place}: {error}") from error
+        raise error.within(place) from error
     except USERS_ERRORS as error:  # of statements that are not ours
         raise ModelError(f"{place}: {in_words(error)}") from error
