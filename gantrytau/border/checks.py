@@ -3,10 +3,11 @@
 Each check takes the place that its message names, the argument and what was found, and returns the value.
 """
 
+import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
@@ -37,8 +38,8 @@ def check_words(function: Callable[..., Any], values: Mapping[str, Any], place: 
 @cache
 def literals(function: Callable[..., Any]) -> dict[str, tuple[Any, ...]]:
     """The words that each argument of a function takes, from its annotation; those with other values are left out."""
-    hints = get_type_hints(function)
-    return {name: words for name, hint in hints.items() if name != "return" and (words := _listed(hint))}
+    parameters = inspect.signature(function).parameters.values()
+    return {one.name: words for one in parameters if (words := _listed(one.annotation))}
 
 
 def _listed(hint: Any) -> tuple[Any, ...]:
