@@ -5,6 +5,7 @@ Required arguments are stand-ins: words and numbers are looked at first, so that
 
 import importlib
 import inspect
+from dataclasses import is_dataclass
 from typing import Any, Literal, Union, get_args, get_origin
 
 import pytest
@@ -49,9 +50,8 @@ def wrong_values(hint: Any) -> tuple[Any, ...]:
 
 def checks_itself(kind: type) -> bool:
     """Whether people make objects of a class with arguments of their own: no model, no record that is only returned."""
-    return not issubclass(kind, (Model, BaseException)) and bool(
-        {"__init__", "__post_init__"} & vars(kind).keys()
-    )
+    made = "__post_init__" if is_dataclass(kind) else "__init__"
+    return not issubclass(kind, (Model, BaseException)) and made in vars(kind)
 
 
 def cases() -> list[tuple[str, str]]:
