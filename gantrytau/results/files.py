@@ -24,8 +24,9 @@ def save(result: Series, path: str | os.PathLike[str], display: Display = None) 
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise ModelError(
-            f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
-            + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0]
+            f"found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
+            + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0],
+            place=str(path),
         )
     if writer is _write_csv:
         shown = shown_units(result, ("time", *result.names), display, SI, "save")
