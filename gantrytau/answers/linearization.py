@@ -15,8 +15,9 @@ import numpy as np
 
 from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
 from gantrytau.answers.linear_systems.discretisation import held
-from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_period
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.sample_to_sample import DrivenRows, from_sample_to_sample
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
@@ -109,12 +110,12 @@ def linearize(
     no such point, StructureError if the equations are singular there, ModelError for unknown names, a period that
     does not fit, and a model with whens.
     """
+    if period is not None:
+        period = number("linearize", "period", period, unit="s", above=0)
     dae = model if isinstance(model, Translated) else translate_model(model)
     refuse_sticking(dae.flat)
     refuse_delays(dae.flat)
     refuse_whens(dae.flat)
-    if period is not None:
-        check_period(f"linearize {dae.name}", period)
     if parameters:
         dae = _with_parameters(dae, parameters)
     columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))
@@ -257,9 +258,9 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
 def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
     """Enter given values; names of the symbols that they fix."""
     held: set[str] = set()
-    for name, number in scalars.items():
+    for name, given in scalars.items():
         if name == dae.flat.time.name():
-            values[name] = number
+            values[name] = given
             continue
         alias = dae.root(name)
         if alias is None:
@@ -267,10 +268,10 @@ def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float
                 f"at: {name} follows from other variables of {dae.name}; give those", argument="at"
             )
         offset, still = dae.number(alias.offset), alias.root is None or alias.order > 0
-        value = number - offset if alias.root is None else dae.number(alias.root_value(number))
-        if still and abs(value) > 1e-9 * max(1.0, abs(number)):
+        value = given - offset if alias.root is None else dae.number(alias.root_value(given))
+        if still and abs(value) > 1e-9 * max(1.0, abs(given)):
             raise InitializationError(
-                f"at: {name} is {number:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
+                f"at: {name} is {given:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
             )
         if not still:
             values[alias.symbol] = value

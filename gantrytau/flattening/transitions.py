@@ -88,11 +88,6 @@ def _read(said: Transition, where: Where, modes: dict[str, Placed], instance: In
             f"{place}: found a transition of {said.mode.path} from {said.source} to itself, expected two modes; what "
             f"happens within one is when(logic_and(self.mode.is_in('{said.source}'), ...), ...)"
         )
-    number = isinstance(said.priority, (int, float)) and not isinstance(said.priority, bool)
-    if said.priority is not None and not (number and np.isfinite(said.priority)):
-        raise ModelError(
-            f"{place}: found priority={said.priority!r}, expected a number; the lowest acts first"
-        )
     guard = condition_of(said.guard, instance.symbols, (), place)
     return _Arrow(said, where, guard, guard)
 

@@ -1,7 +1,5 @@
 """What is no mode, and what is no transition of it."""
 
-from typing import Any
-
 import pytest
 
 from gantrytau import Mode, Model, ModelError, Parameter, Real, der, flatten, fmax, time, transition
@@ -21,9 +19,6 @@ class Base(Model):
     def equations(self):
         yield der(self.x) == self.k
         yield from self.changes()
-
-
-WORD: Any = "high"
 
 
 def with_changes(changes):
@@ -99,10 +94,6 @@ def test_what_is_no_mode(names, words):
         ),
         (lambda self: [transition(self.mode, "free", "contact", True)], "found True as the condition"),
         (lambda self: [transition(self.mode, "free", "contact", self.x)], "a number, expected a comparison"),
-        (
-            lambda self: [transition(self.mode, "free", "contact", self.x > 1, priority=WORD)],
-            "found priority='high', expected a number; the lowest acts first",
-        ),
         (
             lambda self: [transition(self.mode, "free", "contact", self.x > 1, period=-1.0)],
             "expected a way to every mode",

@@ -322,11 +322,3 @@ def test_functions_and_derivatives_of_any_order():
     assert at["der(der(x))"] == pytest.approx(-1.2, rel=1e-14)
     np.testing.assert_allclose(at["r"], [0.3, 1.0, 2 * 4.0 - 2 * 0.3 * 1.2], rtol=1e-14)
     np.testing.assert_allclose(translate(Ringing()).evaluate({"x": -2.0, "v": 0.0})["r"][:2], [-0.5, -1.0])
-
-
-@pytest.mark.parametrize("order", [0, -1, 1.5, "2", True])
-def test_an_order_of_a_derivative_that_is_none(order):
-    with pytest.raises(
-        ModelError, match=r"equation 2: der: found order .*, expected a whole number of at least 1"
-    ):
-        translate(plant(lambda p: der(p.x, order) == 0))

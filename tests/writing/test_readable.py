@@ -7,7 +7,7 @@ import casadi as ca
 import pytest
 from matplotlib.mathtext import MathTextParser
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, der, translate
+from gantrytau import Input, Model, Parameter, Real, der, translate
 from gantrytau.mechanics.translational import LinearFriction
 from gantrytau_models import GantryTau, Pendulum, prototypes
 from tests.writing.page_reader import PageOfEquations
@@ -164,10 +164,3 @@ def test_latex_writes_letters_indices_and_dots():
     assert r"\mathit{kinetic\_energy}" in latex
     assert r"2 \cdot 10^{-7}" in latex
     assert r"\left|" in latex
-
-
-def test_formats_other_than_the_four_are_refused():
-    with pytest.raises(
-        ModelError, match=r"Pendulum.equations\(format='pdf'\): expected one of 'text', 'latex'"
-    ):
-        translate(Pendulum()).equations("pdf")  # pyright: ignore[reportArgumentType]
