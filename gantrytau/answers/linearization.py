@@ -25,7 +25,7 @@ from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
-from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking, refuse_whens
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
@@ -113,9 +113,7 @@ def linearize(
     if period is not None:
         period = number("linearize", "period", period, unit="s", above=0)
     dae = model if isinstance(model, Translated) else translate_model(model)
-    refuse_sticking(dae.flat)
-    refuse_delays(dae.flat)
-    refuse_whens(dae.flat)
+    refuse_events(dae.flat, "frictions", "delays", "whens")
     if parameters:
         dae = _with_parameters(dae, parameters)
     columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))
@@ -128,15 +126,15 @@ def linearize(
     _expanded(dae, "outputs", names(outputs or ()))
     dae = _with_outputs(dae, names(outputs or ()))
     values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
-    slopes = _Slopes(dae, values)
-    if slopes.condition > POOR:
+    linear = _LinearEquations(dae, values)
+    if linear.condition > POOR:
         # states are a matter of the point: the height of a pendulum is none at its lowest
         dae = translate_flat(dae.flat, dae.request, values)
-        slopes = _Slopes(dae, values)
-    slopes.require_regular()
+        linear = _LinearEquations(dae, values)
+    linear.require_regular()
     wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
     rows = tuple(n for name in wanted for n in dae.expand(name))
-    (A, B, C, D), period = _matrices(dae, slopes, rows, columns, period)
+    (A, B, C, D), period = _matrices(dae, linear, rows, columns, period)
     states = (*dae.states, *(s.name for s in dae.flat.sampled))
     # what is held, and not asked for at the next instant, is no state
     kept = [k for k in range(len(A)) if k < len(dae.states) or np.any(A[:, k]) or np.any(C[:, k])]
@@ -157,7 +155,7 @@ def _expanded(dae: Translated, which: str, wanted: Sequence[str]) -> tuple[str, 
 
 def _matrices(
     dae: Translated,
-    slopes: "_Slopes",
+    linear: "_LinearEquations",
     rows: Sequence[str],
     columns: Sequence[str],
     period: float | None,
@@ -167,7 +165,7 @@ def _matrices(
     chosen, kept = ([dae.known.index(n) for n in names] for names in (columns, [s.name for s in sampled]))
 
     def of(expressions: Sequence[ca.SX], words: Sequence[str]) -> DrivenRows:
-        by_states, by_known = slopes.of(expressions, words)
+        by_states, by_known = linear.of(expressions, words)
         return DrivenRows(by_states, by_known[:, kept], by_known[:, chosen])
 
     rates = of([dae.reduced.chains.rate(n) for n in dae.choice.states], [f"der({n})" for n in dae.states])
@@ -279,7 +277,7 @@ def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float
     return frozenset(held)
 
 
-class _Slopes:
+class _LinearEquations:
     """All equations of a model, linear at a point, solved for what is no state."""
 
     def __init__(self, dae: Translated, values: Mapping[str, float]):

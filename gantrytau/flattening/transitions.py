@@ -16,10 +16,11 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.flattening.instantiation import Instance, Leaf, Placed
-from gantrytau.flattening.whens import condition_of, place_of
+from gantrytau.flattening.whens import condition_of
 from gantrytau.language.declarations import Discrete, Quantity, Real
 from gantrytau.language.events import CurrentMode, Happening, Mode, Sampling, Transition, WhenChain
 from gantrytau.language.functions import if_else, logic_and
+from gantrytau.language.statements import place_of
 from gantrytau.language.symbols import element_names
 
 Where = tuple[str, str, int]  # path, class and number of a statement

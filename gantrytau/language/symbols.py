@@ -31,13 +31,14 @@ class Derivative(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Symbol:
-    """A scalar symbol: a variable, a parameter, or the `order`-th derivative of variable `base`."""
+    """A scalar symbol: a variable, a parameter, or the `order`-th derivative of variable `base`.
+
+    kind: real, input, output, discrete, flow, parameter, propagated; pre: a value just before an instant.
+    """
 
     name: str
     sx: ca.SX
-    kind: (
-        str  # real, input, output, discrete, flow, parameter, propagated; pre: a value just before an instant
-    )
+    kind: str
     base: str
     order: int
 

@@ -72,7 +72,7 @@ def test_robots_answer_as_point_by_point(name):
         )
         for sign in (-1, 1)
     )
-    slopes = function.slopes(*arguments)[:, :, 0]
+    slopes = function.jacobian(*arguments)[:, :, 0]
     known = np.isfinite(behind - before).all(axis=1) & (np.abs(slopes) < 10).all(axis=1)
     assert known.sum() > 20
     np.testing.assert_allclose(slopes[known], (behind - before)[known] / 2e-6, atol=1e-6)
@@ -111,7 +111,7 @@ def test_sizes_of_none_one_and_many():
     dae = translate(DeltaRobot(), units=False)
     function = dae.array_function(["tool.r"], [*PHI, "tool.R"])
     assert [x.shape for x in function(np.zeros((0, 3)))] == [(0, 1)] * 3 + [(0, 9)]
-    assert function.slopes(np.zeros((0, 3))).shape == (0, 12, 3)
+    assert function.jacobian(np.zeros((0, 3))).shape == (0, 12, 3)
     r = dae.evaluate()["tool.r"] + np.random.default_rng(0).uniform(-0.2, 0.2, (100_000, 3))
     r[17] = np.nan
     many = np.hstack(function(r))
