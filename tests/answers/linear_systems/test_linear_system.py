@@ -8,21 +8,9 @@ import pytest
 import scipy.signal as signal
 
 from gantrytau import Input, Model, ModelError, StateSpace, connect, linearize, simulate
-from gantrytau.mechanics.translational import Damper, Fixed, Force, Mass, Spring
+from tests.answers.test_linearization import Oscillator
 
 OSCILLATOR = ([[0, 1], [-25, -1.5]], [0, 0.5], [50, 0])
-
-
-class Mounted(Model):
-    """A mass between a wall and a force."""
-
-    wall, mass, spring, damper, force = Fixed(), Mass(m=2.0), Spring(c=50.0), Damper(d=3.0), Force()
-
-    def equations(self):
-        for part in (self.spring, self.damper):
-            yield connect(self.wall.flange, part.flange_a)
-            yield connect(part.flange_b, self.mass.flange)
-        yield connect(self.force.flange, self.mass.flange)
 
 
 def random_system(seed, n=5, m=2, k=3):
@@ -163,7 +151,7 @@ def test_component_moves_as_its_matrices_say():
 
 
 def test_linearization_answers_as_a_linear_system_with_units(tmp_path):
-    linear = linearize(Mounted(), outputs=["mass.s", "mass.v"])
+    linear = linearize(Oscillator(), outputs=["mass.s", "mass.v"])
     hertz = np.array([0.5, 2.0])
     s = 2j * np.pi * hertz
     assert linear.response(hertz)[0, 0] == pytest.approx(1 / (2 * s**2 + 3 * s + 50), rel=1e-12)
