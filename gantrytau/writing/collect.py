@@ -12,21 +12,9 @@ from gantrytau.writing.syntax import ordered
 
 DIGITS = 14  # of numbers that arise from others: what rounding leaves beyond is dropped
 NOTHING = 1e-14  # of the largest part of a term, below which nothing but rounding is left of it
-ZERO_AT_ZERO = [
-    "sin",
-    "tan",
-    "asin",
-    "atan",
-    "sinh",
-    "tanh",
-    "asinh",
-    "atanh",
-    "abs",
-    "sign",
-    "sqrt",
-    "expm1",
-    "log1p",
-]
+ZERO_AT_ZERO = {
+    "sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "abs", "sign", "sqrt", "expm1", "log1p",
+}  # fmt: skip
 Terms = dict[Node, float]
 
 
