@@ -70,7 +70,6 @@ EXCEPTIONS = {  # offences that are let pass; this list only shrinks
     "gantrytau.commands.controller.controller_file edits a message",
     "gantrytau.commands.estimate.estimate_file edits a message",
     "gantrytau.commands.printing.result_output edits a message",
-    "gantrytau.language.parameter_files edits a message",
     "gantrytau_fmu.controller.controller edits a message",
     "gantrytau_fmu.reading.check_fmu edits a message",
     "gantrytau_fmu.systems.run_fmu edits a message",
