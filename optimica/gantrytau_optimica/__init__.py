@@ -32,8 +32,8 @@ from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityT
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
 from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
-from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
-from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
+from gantrytau_optimica.calibration.devices.gauges import LengthGauge
+from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.diagnostics.device_frames import frame_words
 from gantrytau_optimica.calibration.error_analysis.error_maps import error_map
@@ -195,7 +195,6 @@ __all__ = [
     "TradeOff",
     "Tukey",
     "Way",
-    "Wires",
     "ZeroPhase",
     "arm_model",
     "at",
@@ -248,7 +247,6 @@ __all__ = [
     "plot_q",
     "pose_sensitivities",
     "predict",
-    "predict_late",
     "prepare",
     "printed_models",
     "read_arms",
