@@ -22,7 +22,6 @@ from gantrytau_optimica.calibration.assessment.parameter_rows import (
 )
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.file_lines import in_lines
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
@@ -220,7 +219,6 @@ __all__ = [
     "identify_friction",
     "identify_servo",
     "identify_system",
-    "in_lines",
     "initial",
     "integral_of_squares",
     "is_planned",

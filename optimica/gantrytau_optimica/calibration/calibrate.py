@@ -17,9 +17,9 @@ from gantrytau_optimica.calibration.diagnostics.acceptance import (
     check_count,
     frame_seen,
     in_frame,
-    in_words,
     judged,
     not_in_base,
+    other_frame,
     usable_rows,
 )
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
@@ -118,26 +118,7 @@ def calibrate(
     asked = locals()
     check_words(calibrate, asked)
     instance("calibrate", "measurements", measurements, Measurements, "Measurements(q, r, ...)")
-    for name, usual in ON_RODS.items() if parameters is not None else ():
-        if asked[name] != usual:
-            raise ModelError(
-                f"expected {usual!r} with ",
-                Given("parameters"),
-                ": it speaks of robots on rods",
-                place="calibrate",
-                found=Given(name, asked[name]),
-            )
-    if constraints and method != "ipopt":
-        raise ModelError(
-            Given("constraints"),
-            " with ",
-            Given("method", method),
-            ", expected ",
-            Given("method", "ipopt"),
-            ", which alone keeps them",
-            place="calibrate",
-            argument="constraints",
-        )
+    _check_rods(asked)
     if parameters is not None:
         known = usable(robot, measurements, parameters, joints)
         split = _split(known.rows, holdout, measurements)
@@ -178,7 +159,7 @@ def _on_rods(
     )
     if constraints:
         found = replace(found, constraints=tuple(read_constraints(constraints, found.names)))
-    told = [] if there is None or asked.start == "linear" else [in_words(there, rows)]
+    told = [] if there is None or asked.start == "linear" else [other_frame(there, rows)]
     return found.with_findings([*findings, *told, *judged(found)])
 
 
@@ -238,6 +219,30 @@ def _fitted(
 def _needs_values(prior: Mapping[str, Any] | None) -> bool:
     """Whether a prior speaks of nominal values."""
     return isinstance(prior, Mapping) and any(not isinstance(given, tuple) for given in prior.values())
+
+
+def _check_rods(asked: Mapping[str, Any]) -> None:
+    """ModelError for arguments that speak of robots on rods beside parameters=, and constraints that are not kept."""
+    for name, usual in ON_RODS.items() if asked["parameters"] is not None else ():
+        if asked[name] != usual:
+            raise ModelError(
+                f"expected {usual!r} with ",
+                Given("parameters"),
+                ": it speaks of robots on rods",
+                place="calibrate",
+                found=Given(name, asked[name]),
+            )
+    if asked["constraints"] and asked["method"] != "ipopt":
+        raise ModelError(
+            Given("constraints"),
+            " with ",
+            Given("method", asked["method"]),
+            ", expected ",
+            Given("method", "ipopt"),
+            ", which alone keeps them",
+            place="calibrate",
+            argument="constraints",
+        )
 
 
 def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -> None:

@@ -9,7 +9,7 @@ from gantrytau.border.checks import array
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import CalibrationError
-from gantrytau_optimica.fitting.finding import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows
 
 Array = np.ndarray
 DEGREE = 3  # of the splines of the smooth part
@@ -72,8 +72,7 @@ def checked(q: Any, points: Any) -> tuple[Array, Array, Array, list[Finding]]:
     rows, lost = np.flatnonzero(finite), np.flatnonzero(~finite)
     findings = []
     if lost.size:
-        words = f"{rows_in_words(lost)} hold no finite numbers and are left out"
-        findings.append(Finding("nan", lost, words))
+        findings.append(Finding("nan", lost, (Rows(lost), " hold no finite numbers and are left out")))
     if len(np.unique(q[rows])) < 2 * (DEGREE + 1):
         raise CalibrationError(
             f"linearity: found {len(np.unique(q[rows]))} different positions of the cart, expected {2 * (DEGREE + 1)} at "
@@ -104,8 +103,9 @@ def _refuse_wrong_numbers(q: Array, points: Array, rows: Array) -> None:
     astray = off > ASTRAY * length + EXACT
     if np.any(astray) and length > 0:
         raise CalibrationError(
-            f"linearity: found points up to {off.max():.3g} m beside a straight line in {rows_in_words(rows[astray])}, "
-            "expected those of one guideway; correct them, or leave them out",
+            f"linearity: found points up to {off.max():.3g} m beside a straight line in ",
+            Rows(rows[astray]),
+            ", expected those of one guideway; correct them, or leave them out",
             kind="outliers",
             rows=rows[astray],
         )
@@ -275,5 +275,5 @@ def outliers(stray: Array) -> list[Finding]:
     """The finding that rows are stray, if there are any."""
     if not stray.size:
         return []
-    words = f"{rows_in_words(stray)} do not fit the others; measure them again, or leave them out with loss='robust'"
-    return [Finding("outliers", stray, words)]
+    words = " do not fit the others; measure them again, or leave them out with "
+    return [Finding("outliers", stray, (Rows(stray), words, Given("loss", "robust")))]
