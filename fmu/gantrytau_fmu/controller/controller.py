@@ -223,7 +223,7 @@ class Controller:
                 self._begin(drives, float(stop))
                 ended = self._samples(count, drives, kept)
             except RunEnded as error:
-                ended = error.words
+                ended = error.reason
             except KeyboardInterrupt:  # pressed again, in what did not come back
                 ended = "interrupted"
             except GantryTauError as error:
@@ -371,10 +371,7 @@ class Controller:
             value = self._references.get(channel.name)
             if value is None:
                 value = first[self._plant.inputs.slices[channel.name]]
-            try:
-                found += drives_of(channel.name, value, channel.size, (0.0, stop))
-            except ModelError as error:
-                raise ModelError(_of_references(error), argument="references") from error
+            found += drives_of("references", channel.name, value, channel.size, (0.0, stop))
         return found
 
 
@@ -383,11 +380,7 @@ def _nominal(drives: Sequence[Drive], t: float) -> Values:
     try:
         return np.array([drive(t) for drive in drives])
     except ModelError as error:
-        raise SolveError(_of_references(error), time=t) from error
-
-
-def _of_references(error: ModelError) -> str:
-    return "references " + str(error).removeprefix("inputs ").removeprefix("input ")
+        raise SolveError(str(error), time=t) from error
 
 
 _GROUPS = ("the parameters", "the plant", "the references")

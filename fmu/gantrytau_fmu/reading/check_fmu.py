@@ -56,7 +56,7 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
         model = model_of(files)
         fmu = describe(files, model)
     except ModelError as error:
-        return [FmuFinding("error", str(error).removeprefix(f"{path}: "))]
+        return [FmuFinding("error", str(error))]
     findings = list(inconsistencies(fmu, files, model))
     for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined

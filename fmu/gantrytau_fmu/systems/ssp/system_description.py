@@ -16,7 +16,7 @@ from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, build_system, unconnected
-from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp, structure_of
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,9 @@ def check_system(
 
 def _found(path: Path, folder: Path, run: bool, timeout: float) -> Iterator[FmuFinding]:
     try:
-        structure = read_ssp(path, folder / "system")
+        structure = structure_of(path, folder / "system")
     except ModelError as error:
-        yield FmuFinding("error", str(error).removeprefix(f"{path}: "), str(path))
+        yield FmuFinding("error", str(error), str(path))
         return
     whole = True
     for file in dict.fromkeys(structure.components.values()):
