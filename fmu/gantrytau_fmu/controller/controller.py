@@ -17,13 +17,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import check_words, number
 from gantrytau.border.refusal import GantryTauError, ModelError, SolveError, did_you_mean
 from gantrytau.interruption import on_interrupt
 from gantrytau_fmu.controller.board import ACTIVATE, STATES, Board, State
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
-from gantrytau_fmu.controller.controller_checks import above_zero, check_kinds, state_of
+from gantrytau_fmu.controller.controller_checks import check_kinds
 from gantrytau_fmu.controller.exchange.remote_client import RemoteClient
 from gantrytau_fmu.controller.exchange.server import Server
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
@@ -71,12 +72,9 @@ class Controller:
         state: State = "obtain",
         patience: float = 10.0,
     ):
-        self.period = above_zero("period", period)
-        if clock not in ("virtual", "wall"):
-            raise ModelError(
-                f"controller: found clock={clock!r}, expected 'virtual' or 'wall'", argument="clock"
-            )
-        patience = above_zero("patience", patience)
+        check_words(Controller, {"clock": clock, "state": state}, "controller")
+        self.period = number("controller", "period", period, above=0.0, unit="s")
+        patience = number("controller", "patience", patience, above=0.0, unit="s")
         self._clock = WallClock(self.period) if clock == "wall" else VirtualClock(self.period, patience)
         check_kinds(dict(limits=limits, references=references, parameters=parameters), kinematics, clients)
         self._plant = SteppedPart("plant", plant, starts)
@@ -86,7 +84,7 @@ class Controller:
         self._law = users_law(controller, wires or {})
         self.tunables, self._tuned = self._all_tunables(parameters or {})
         self._lines = list[ClientLine]()
-        self._state: State = state_of(state)
+        self._state: State = state
         self._coming: State = self._state
         self._changes = PlannedChanges(self.period)
         self._pressed, self._ran, self._wall = 0, False, 0.0
@@ -212,7 +210,7 @@ class Controller:
             raise ModelError(
                 "controller: found a second run, expected one; make another Controller, which begins anew"
             )
-        count = int(above_zero("stop", stop) / self.period + ROUNDING)
+        count = int(number("controller", "stop", stop, above=0.0, unit="s") / self.period + ROUNDING)
         drives, self._ran = self._drives(float(stop)), True
         applied = [Channel(f"applied.{c.name}", c.unit, c.size) for c in self._plant.inputs]
         begin = time.perf_counter()

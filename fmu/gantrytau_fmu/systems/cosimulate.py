@@ -30,6 +30,7 @@ from gantrytau_fmu.systems.master import (
     Master,
     RunningComponent,
     RunningSystem,
+    check_times,
     make_grid,
     no_component,
     paces_of,
@@ -342,15 +343,3 @@ def _with_errors(result: Result, half: Result) -> Result:
         title=result.title,
         ended=result.ended,
     )
-
-
-def check_times(place: str, begin: float, stop: float, step: float) -> None:
-    """ModelError unless begin < stop and 0 < step <= stop - begin."""
-    if not stop > begin:
-        expected = f"expected a time after the beginning at {begin:g} s; choose a later one"
-        raise ModelError(expected, place=place, found=Given("stop", stop))
-    if not 0 < step <= (stop - begin) * (1 + 1e-9):
-        expected = (
-            f"expected more than 0 and at most the {stop - begin:g} s that are simulated; choose such a step"
-        )
-        raise ModelError(expected, place=place, found=Given("step", step))

@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol, get_args
 import numpy as np
 
 from gantrytau.border.checks import check_words, number, whole
-from gantrytau.border.refusal import ModelError, SolveError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, SolveError, did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_fmu.systems.component import dotted
 from gantrytau_fmu.systems.connected_system import ConnectedSystem
@@ -109,6 +109,18 @@ class Grid:
         if last == self.count and not self.even:
             return self.stop - self.time(first)
         return (last - first) * self.step
+
+
+def check_times(place: str, begin: float, stop: float, step: float) -> None:
+    """ModelError unless begin < stop and 0 < step <= stop - begin."""
+    if not stop > begin:
+        expected = f"expected a time after the beginning at {begin:g} s; choose a later one"
+        raise ModelError(expected, place=place, found=Given("stop", stop))
+    if not 0 < step <= (stop - begin) * (1 + 1e-9):
+        expected = (
+            f"expected more than 0 and at most the {stop - begin:g} s that are simulated; choose such a step"
+        )
+        raise ModelError(expected, place=place, found=Given("step", step))
 
 
 def make_grid(begin: float, stop: float, step: float) -> Grid:

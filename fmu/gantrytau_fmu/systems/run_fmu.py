@@ -13,8 +13,8 @@ from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import build_system, unconnected, warn_of
-from gantrytau_fmu.systems.cosimulate import check_times, run_system
-from gantrytau_fmu.systems.master import Grid, Master, make_grid
+from gantrytau_fmu.systems.cosimulate import run_system
+from gantrytau_fmu.systems.master import Grid, Master, check_times, make_grid
 from gantrytau_fmu.systems.model_exchange import integrate
 
 STEPS = 500  # where neither the caller nor the file says a step

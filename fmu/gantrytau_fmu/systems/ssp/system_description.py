@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
@@ -108,6 +109,7 @@ def check_system(
 
     run: also try each FMU, as `check_fmu` does. `FmuFinding.path` names the file in the archive.
     """
+    number("check_system", "timeout", timeout, above=0.0, unit="s")
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
         return errors_first(_found(Path(path), Path(folder), run, timeout))
 
