@@ -16,7 +16,7 @@ from gantrytau_optimica.calibration.diagnostics.acceptance import (
     usable_rows,
 )
 from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, started
-from gantrytau_optimica.calibration.fitting.rod_fit import read_prior
+from gantrytau_optimica.calibration.fitting.priors import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words

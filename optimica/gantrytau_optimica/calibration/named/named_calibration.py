@@ -12,13 +12,13 @@ from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.calibration.design.identifiability import dependencies
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
-from gantrytau_optimica.calibration.fitting.covariance import inverse_of, spread_by, undetermined
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.named_parameters import Named
 from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
 from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.calibration.report.report import Reported
+from gantrytau_optimica.fitting.covariance import spread_by
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
+from gantrytau_optimica.fitting.least_squares import Minimum
 
 Array = np.ndarray
 
@@ -91,7 +91,7 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        return undetermined(self.minimum, self.names)
+        return self.minimum.undetermined(self.names)
 
     @property
     def dependent(self) -> dict[str, list[str]]:
@@ -109,10 +109,10 @@ class NamedCalibration(Reported, FittedNumbers):
         columns = [moved.transpose(1, 0, 2).reshape(len(x), -1)]
         if data.shared is not None:
             columns.append(np.einsum("nji,nik->jk", J[:, :, :3], R @ data.shared))
-        pulled = self.minimum.slopes[len(self.minimum.slopes) - len(residuals.prior) :] / residuals.scale
+        pulled = self.minimum.jacobian[len(self.minimum.jacobian) - len(residuals.prior) :] / residuals.scale
         for row, (_, deviation) in zip(pulled, residuals.prior.values(), strict=True):
             columns.append((row * np.abs(row).max() * deviation)[:, None])
-        return spread_by(inverse_of(self.minimum, residuals.scale), *columns)
+        return spread_by(self.minimum.inverse, *columns)
 
     @property
     def advice(self) -> str:

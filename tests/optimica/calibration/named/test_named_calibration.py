@@ -217,7 +217,7 @@ def test_poses_are_selected_for_named_parameters(method):
         (dict(method="ipopt"), "found method='ipopt' with parameters=, expected 'gauss-newton'"),
         (dict(joints=SCARA[:2]), "measurements of 3 joints for Scara, expected 2: shoulder.phi, elbow.phi"),
         (dict(prior={"upperr": 1e-3}), r"prior for 'upperr', which is not identified; did you mean"),
-        (dict(prior={"upper.r[0]": 0.0}), "found the deviation 0 for 'upper.r.0.' in prior"),
+        (dict(prior={"upper.r[0]": 0.0}), "deviation for 'upper.r.0.'.*prior=0.0"),
         (dict(robot=3), "found 3 as robot, expected a model instance with a tool"),
     ],
 )
