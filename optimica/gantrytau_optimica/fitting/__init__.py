@@ -1,1 +1,1 @@
-"""Least squares that all fits share: step, blocks, robust weights, covariance, and what they leave of their data."""
+"""Least squares that all fits share: step, blocks, rank, robust weights, covariance, and what they leave of their data."""

@@ -9,16 +9,16 @@ import numpy as np
 
 from gantrytau import Model
 from gantrytau.kinematics import Kinematics
-from gantrytau_optimica.calibration.design.identifiability import dependencies
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.fitting.named_parameters import Named
-from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
+from gantrytau_optimica.calibration.fitting.pose_residuals import PoseResiduals, strays
 from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.calibration.report.report import Reported
 from gantrytau_optimica.fitting.covariance import spread_by
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
 from gantrytau_optimica.fitting.least_squares import Minimum
+from gantrytau_optimica.fitting.rank import BaseParameters, base_of_directions
 
 Array = np.ndarray
 
@@ -93,10 +93,10 @@ class NamedCalibration(Reported, FittedNumbers):
     def undetermined(self) -> tuple[str, ...]:
         return self.minimum.undetermined(self.names)
 
-    @property
-    def dependent(self) -> dict[str, list[str]]:
-        """Numbers that data do not tell apart from others: each with those that take up its change."""
-        return dependencies(self.minimum.directions[self.rank :], self.residuals.scale, self.names)
+    @cached_property
+    def base(self) -> BaseParameters:
+        """What data determine in place of parameters that they do not tell apart."""
+        return base_of_directions(self.minimum.directions[self.rank :], self.residuals.scale)
 
     @cached_property
     def _covariance(self) -> Array:
@@ -116,7 +116,7 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @property
     def advice(self) -> str:
-        framed = any(set(others) & set(FRAME) for others in self.dependent.values())
+        framed = any("frame." in words for words in self.base.words(self.names))
         base = ", or measure in the base of the robot, frame='base'" if framed else ""
         return f"leave them out of parameters=, measure other poses, or give prior={{name: deviation}}{base}"
 
