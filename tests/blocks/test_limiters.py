@@ -7,6 +7,7 @@ import pytest
 
 from gantrytau import Fixed, Input, Model, ModelError, connect, simulate, sin, translate
 from gantrytau.blocks import DeadZone, Hysteresis, Integrator, Limiter, RateLimiter, Step
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -21,8 +22,7 @@ def bent(block, signal, stop=1.0, points=2):
         memory = Integrator()
 
         def equations(self):
-            yield connect(self.signal, self.block.u)
-            yield connect(self.block.y, self.memory.u)
+            yield from row(self.signal, self.block, self.memory)
 
     model = type("Bent", (Bent,), {"block": block})()
     return simulate(model, stop=stop, inputs={"signal": signal}, tolerance=TOLERANCE, points=points)
@@ -109,8 +109,7 @@ class Relay(Model):
     memory = Integrator(y=Fixed(0.0))
 
     def equations(self):
-        yield connect(self.relay.y, self.memory.u)
-        yield connect(self.memory.y, self.relay.u)
+        yield from row(self.relay, self.memory, self.relay)
 
 
 @pytest.mark.parametrize("points", [2, 1001])

@@ -13,6 +13,7 @@ from gantrytau.kinematics import Kinematics, assembly_modes
 from gantrytau.kinematics.rotations import turned
 from gantrytau.mechanics.multibody import Body, FixedTranslation, PointMass, Prismatic, Revolute, World
 from gantrytau_models import DeltaRobot, GantryTau, Pendulum, StewartPlatform, prototypes
+from tests.mechanisms.rows import row
 
 ALONG_X = np.array([1.0, 0.0, 0.0])
 
@@ -202,8 +203,7 @@ def test_a_model_that_nothing_drives():
         x = Prismatic(n=[1.0, 0.0, 0.0])
 
         def equations(self):
-            yield connect(self.world.frame_b, self.x.frame_a)
-            yield connect(self.x.frame_b, self.tool.body.frame_a)
+            yield from row(self.world, self.x, self.tool.body)
 
     with pytest.raises(ModelError, match="has the inputs none, expected forces"):
         Kinematics(Loose())

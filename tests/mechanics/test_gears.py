@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, Model, StructureError, connect, simulate, sin, translate
+from gantrytau import Fixed, Model, StructureError, simulate, sin, translate
 from gantrytau.mechanics import gears, rotational, translational
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -19,11 +20,7 @@ class Turning(Model):
     damper, wall = rotational.Damper(d=4.0), rotational.Fixed()
 
     def equations(self):
-        yield connect(self.motor.flange, self.rotor.flange_a)
-        yield connect(self.rotor.flange_b, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.load.flange_a)
-        yield connect(self.load.flange_b, self.damper.flange_a)
-        yield connect(self.damper.flange_b, self.wall.flange)
+        yield from row(self.motor, self.rotor, self.gear, self.load, self.damper, self.wall)
 
 
 class Sliding(Model):
@@ -36,11 +33,7 @@ class Sliding(Model):
     spring, wall = translational.Spring(c=500.0), translational.Fixed()
 
     def equations(self):
-        yield connect(self.motor.flange, self.rotor.flange_a)
-        yield connect(self.rotor.flange_b, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.mass.flange)
-        yield connect(self.mass.flange, self.spring.flange_a)
-        yield connect(self.spring.flange_b, self.wall.flange)
+        yield from row(self.motor, self.rotor, self.gear, self.mass, self.spring, self.wall)
 
 
 SLIDING = {
@@ -99,8 +92,7 @@ def test_a_ball_screw_holds_a_load_with_little_torque():
         motor, screw, load = rotational.Position(), gears.BallScrew(lead=0.01), translational.Force()
 
         def equations(self):
-            yield connect(self.motor.flange, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.load.flange)
+            yield from row(self.motor, self.screw, self.load)
 
     at = translate(Press()).evaluate({"load.f": -2000.0, "motor.phi": 0.3})
     assert at["motor.tau"] == pytest.approx(2000.0 * 0.01 / (2 * np.pi), rel=1e-14)
@@ -112,9 +104,7 @@ def test_an_axis_with_a_ball_screw_speeds_up_evenly():
         screw, slide = gears.BallScrew(lead=0.01), translational.Mass(m=12.0)
 
         def equations(self):
-            yield connect(self.motor.flange, self.rotor.flange_a)
-            yield connect(self.rotor.flange_b, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.slide.flange)
+            yield from row(self.motor, self.rotor, self.screw, self.slide)
 
     found = simulate(Axis(), stop=1.0, inputs={"motor.tau": 0.1}, tolerance=TOLERANCE)
     turn = 2 * np.pi / 0.01
@@ -131,8 +121,7 @@ class Elastic(Model):
     )
 
     def equations(self):
-        yield connect(self.motor.flange, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.load.flange_a)
+        yield from row(self.motor, self.gear, self.load)
 
 
 def test_a_load_swings_behind_an_elastic_gear():
@@ -164,8 +153,7 @@ def test_a_gear_held_at_both_ends_is_refused():
         gear, left, right = gears.IdealGear(ratio=3.0), rotational.Fixed(), rotational.Fixed()
 
         def equations(self):
-            yield connect(self.left.flange, self.gear.flange_a)
-            yield connect(self.gear.flange_b, self.right.flange)
+            yield from row(self.left, self.gear, self.right)
 
     with pytest.raises(StructureError, match=r"Undetermined: gear\.flange_a\.tau"):
         translate(Held())

@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, StructureError, connect, cos, simulate, sin, translate
 from gantrytau.mechanics import translational
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -17,8 +18,7 @@ class Swinging(Model):
     link = translational.SpringDamper(c=50.0, d=0.0, s_rel0=0.4)
 
     def equations(self):
-        yield connect(self.wall.flange, self.link.flange_a)
-        yield connect(self.link.flange_b, self.mass.flange)
+        yield from row(self.wall, self.link, self.mass)
 
 
 def test_a_mass_on_a_spring_swings_with_the_root_of_c_over_m():
@@ -44,8 +44,7 @@ def test_a_spring_damper_is_a_spring_beside_a_damper():
 
         def equations(self):
             for one in (self.spring, self.damper):
-                yield connect(self.wall.flange, one.flange_a)
-                yield connect(one.flange_b, self.mass.flange)
+                yield from row(self.wall, one, self.mass)
 
     together = simulate(Swinging(link=dict(d=4.0)), stop=2.0, tolerance=TOLERANCE)
     apart = simulate(Apart(), stop=2.0, tolerance=TOLERANCE)
@@ -92,9 +91,7 @@ class Led(Model):
     damper, wall = translational.Damper(d=3.0), translational.Fixed()
 
     def equations(self):
-        yield connect(self.source.flange, self.mass.flange)
-        yield connect(self.mass.flange, self.damper.flange_a)
-        yield connect(self.damper.flange_b, self.wall.flange)
+        yield from row(self.source, self.mass, self.damper, self.wall)
 
 
 def test_a_position_source_tells_the_force_it_takes():
@@ -130,11 +127,7 @@ class Measured(Model):
     speed, relative = translational.SpeedSensor(), translational.RelativeSensor()
 
     def equations(self):
-        yield connect(self.push.flange, self.near.flange)
-        yield connect(self.near.flange, self.force.flange_a)
-        yield connect(self.force.flange_b, self.spring.flange_a)
-        yield connect(self.spring.flange_b, self.far.flange)
-        yield connect(self.far.flange, self.position.flange)
+        yield from row(self.push, self.near, self.force, self.spring, self.far, self.position)
         yield connect(self.far.flange, self.speed.flange)
         yield connect(self.near.flange, self.relative.flange_a)
         yield connect(self.far.flange, self.relative.flange_b)
@@ -179,8 +172,7 @@ def test_misused_sensors_are_explained():
         push, sensor, wall = translational.Force(), translational.RelativeSensor(), translational.Fixed()
 
         def equations(self):
-            yield connect(self.wall.flange, self.sensor.flange_a)
-            yield connect(self.sensor.flange_b, self.push.flange)
+            yield from row(self.wall, self.sensor, self.push)
 
     class Loose(Model):
         push, sensor = translational.Force(), translational.PositionSensor()
@@ -192,8 +184,7 @@ def test_misused_sensors_are_explained():
         left, sensor, right = translational.Fixed(), translational.ForceSensor(), translational.Fixed()
 
         def equations(self):
-            yield connect(self.left.flange, self.sensor.flange_a)
-            yield connect(self.sensor.flange_b, self.right.flange)
+            yield from row(self.left, self.sensor, self.right)
 
     for model, words in (
         (Between(), r"sensor\.s_rel \(a relative sensor carries no force; connect it beside a component"),

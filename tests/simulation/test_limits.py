@@ -46,12 +46,6 @@ def test_nothing_is_said_of_limits_that_are_kept_or_not_looked_at(model, limits)
         simulate(model, stop=2.0, limits=limits)
 
 
-def test_another_word_for_limits_is_refused():
-    with pytest.raises(ModelError, match="found limits='end', expected 'warn' or 'stop' or None") as error:
-        simulate(Throw(), stop=1.0, limits="end")  # pyright: ignore[reportArgumentType]
-    assert error.value.argument == "limits"
-
-
 class Slide(Model):
     """A mass between stops."""
 

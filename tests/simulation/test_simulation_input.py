@@ -46,7 +46,7 @@ from tests.simulation.test_simulation import Circuit, Oscillator
         ({"f": lambda t: 1.0 if t > 1 else 2.0}, "write it with gantrytau.sin, exp, if_else"),
         ({"f": lambda t: [t, t]}, "input f: found 2 values, expected 1"),
         ({"f": lambda: 1.0}, "input f: the function of time"),
-        (3.0, "inputs: found 3.0, expected"),
+        (3.0, "found inputs=3.0, expected"),
     ],
 )
 def test_wrong_inputs(inputs, words):
@@ -79,12 +79,9 @@ def test_samples_cannot_be_differentiated():
 @pytest.mark.parametrize(
     ("keywords", "words"),
     [
-        (dict(stop=-1.0), "expected start < stop"),
-        (dict(stop=math.nan), "expected start < stop"),
-        (dict(stop="late"), "expected start < stop"),
-        (dict(stop=1.0, tolerance=0.0), "tolerance=0.0, expected a number between 0 and 1"),
-        (dict(stop=1.0, points=1), "points=1, expected a whole number of at least 2"),
-        (dict(stop=1.0, points=10.5), "points=10.5"),
+        (dict(start=2.0, stop=1.0), "found stop=1.0, expected a number above 2 in s"),
+        (dict(stop=1.0, tolerance=0.0), "found tolerance=0.0"),
+        (dict(stop=1.0, points=1), "found points=1, expected a whole number of at least 2"),
         (dict(stop=1.0, parameters={"k": 1.0}), "has no parameter 'k'"),
         (dict(stop=1.0, parameters={"c": [1.0, 2.0]}), "c: value has shape (2,), expected ()"),
         (dict(stop=1.0, parameters={"c": math.inf}), "expected a finite number"),

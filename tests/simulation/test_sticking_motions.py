@@ -28,6 +28,7 @@ from gantrytau import (
 from gantrytau.mechanics import multibody, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import GantryTau, prototypes
+from tests.mechanisms.rows import row
 from tests.references.sticking import M, OnSpring, Shaken, on_spring, shaken
 
 TOLERANCE = 1e-10
@@ -134,8 +135,7 @@ class Incline(Model):
     floor = StickSlipFriction(f_c=8.0, f_s=10.0)
 
     def equations(self):
-        yield connect(self.ground.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.block.frame_a)
+        yield from row(self.ground, self.slide, self.block)
         yield connect(self.slide.axis, self.floor.flange)
 
 

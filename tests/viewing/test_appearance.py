@@ -7,6 +7,7 @@ from gantrytau import Array, Model, ModelError, Parameter, Real, connect, der, f
 from gantrytau.language.self_description.appearance import Ball, Cuboid, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, PointMass, Prismatic, World
 from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, Pendulum, SixLinkGantryTau, prototypes
+from tests.mechanisms.rows import row
 
 
 class Slide(Model):
@@ -17,8 +18,7 @@ class Slide(Model):
     body = PointMass(m=1.0)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.body.frame_a)
+        yield from row(self.world, self.slide, self.body)
 
 
 class Slides(Model):

@@ -26,6 +26,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.multibody import Fixed as Mount
+from tests.mechanisms.rows import row
 
 
 class Swing(Model):
@@ -36,8 +37,7 @@ class Swing(Model):
     body = Body(r_cm=[0.3, 0.0, 0.0])
 
     def equations(self):
-        yield connect(self.world.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.body.frame_a)
+        yield from row(self.world, self.hinge, self.body)
 
 
 class Thrown(Model):
@@ -60,11 +60,8 @@ class Triangle(Model):
     weight = Body()
 
     def equations(self):
-        yield connect(self.world.frame_b, self.left.frame_a)
-        yield connect(self.left.frame_b, self.one.frame_a)
-        yield connect(self.world.frame_b, self.ground.frame_a)
-        yield connect(self.ground.frame_b, self.right.frame_a)
-        yield connect(self.right.frame_b, self.two.frame_a)
+        yield from row(self.world, self.left, self.one)
+        yield from row(self.world, self.ground, self.right, self.two)
         yield connect(self.one.frame_b, self.top.frame_a)
         yield connect(self.one.frame_b, self.weight.frame_a)
         yield connect(self.top.frame_b, self.two.frame_b)
@@ -182,8 +179,7 @@ def test_rotation_without_inertia():
         world, hinge, mass = World(), Revolute(), PointMass()
 
         def equations(self):
-            yield connect(self.world.frame_b, self.hinge.frame_a)
-            yield connect(self.hinge.frame_b, self.mass.frame_a)
+            yield from row(self.world, self.hinge, self.mass)
 
     assert "Undetermined: hinge.phi (nothing holds the rotation about its axis)" in refusal(
         Spindle(), StructureError
@@ -212,9 +208,7 @@ def test_rotation_between_a_rod_and_a_bar():
         )
 
         def equations(self):
-            yield connect(self.world.frame_b, self.rod.frame_a)
-            yield connect(self.rod.frame_b, self.bar.frame_a)
-            yield connect(self.bar.frame_b, self.mass.frame_a)
+            yield from row(self.world, self.rod, self.bar, self.mass)
 
     found = refusal(Hanging(), StructureError)
     assert "bar.frame_a: nothing determines the orientation" in found
@@ -227,9 +221,7 @@ class SpinningBar(Model):
     world, ball, bar, mass = World(), Spherical(), FixedTranslation(r=[0.0, 0.0, -1.0]), PointMass()
 
     def equations(self):
-        yield connect(self.world.frame_b, self.ball.frame_a)
-        yield connect(self.ball.frame_b, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.mass.frame_a)
+        yield from row(self.world, self.ball, self.bar, self.mass)
 
 
 def test_rotation_of_a_bar_about_itself_is_named():
@@ -288,13 +280,9 @@ def test_a_loop_with_more_drives_than_mobility():
         a, b = rotational.Position(phi=Start(-1.0)), translational.Position()
 
         def equations(self):
-            yield connect(self.world.frame_b, self.left.frame_a)
-            yield connect(self.left.frame_b, self.one.frame_a)
-            yield connect(self.one.frame_b, self.top.frame_a)
+            yield from row(self.world, self.left, self.one, self.top)
             yield connect(self.one.frame_b, self.weight.frame_a)
-            yield connect(self.top.frame_b, self.two.frame_a)
-            yield connect(self.two.frame_b, self.right.frame_a)
-            yield connect(self.right.frame_b, self.ground.frame_b)
+            yield from row(self.top, self.two, self.right, self.ground.frame_b)
             yield connect(self.ground.frame_a, self.slide.frame_b)
             yield connect(self.world.frame_b, self.slide.frame_a)
             yield connect(self.a.flange, self.left.axis)

@@ -7,6 +7,7 @@ from gantrytau import Fixed, GantryTauError, Model, ModelError, Start, Structure
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody import LineForce, PointMass, SphericalSpherical, World
 from tests.mechanics.multibody.test_bad_mechanisms import Driven, Swing, Thrown, refusal
+from tests.mechanisms.rows import row
 from tests.references.rotations import turn
 
 # parameters
@@ -17,8 +18,7 @@ def test_a_rod_of_negative_length():
         world, rod, mass = World(), SphericalSpherical(L=-1.0), PointMass()
 
         def equations(self):
-            yield connect(self.world.frame_b, self.rod.frame_a)
-            yield connect(self.rod.frame_b, self.mass.frame_a)
+            yield from row(self.world, self.rod, self.mass)
 
     assert "rod.L: value is -1, expected at least 0 (length between" in refusal(Rod(), ModelError)
     assert "rod (SphericalSpherical): found rod.L = 0; expected a length above zero" in refusal(
@@ -92,8 +92,7 @@ def test_a_line_force_between_points_that_coincide():
         mass = PointMass(frame_a=dict(r=Fixed([0.0, 0.0, 0.0])))
 
         def equations(self):
-            yield connect(self.world.frame_b, self.line.frame_a)
-            yield connect(self.line.frame_b, self.mass.frame_a)
+            yield from row(self.world, self.line, self.mass)
             yield connect(self.line.flange_a, self.spring.flange_a)
             yield connect(self.line.flange_b, self.spring.flange_b)
 

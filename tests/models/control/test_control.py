@@ -109,7 +109,7 @@ def test_computed_torque_gives_no_force_out_of_reach():
 
 
 def test_mistakes_are_told():
-    with pytest.raises(ModelError, match=r"PidController: found 5, expected a prototype record"):
+    with pytest.raises(ModelError, match="PidController: found 5, expected a Prototype"):
         PidController(5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(
         ModelError, match=r"TrackingController: found control=.*GantryTau.*, expected a class"

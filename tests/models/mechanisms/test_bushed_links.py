@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from gantrytau import InitializationError, Model, connect, linearize
+from gantrytau import InitializationError, Model, linearize
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau_models import BushedSixLinkGantryTau, ElasticSixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.bushed_links import BushedRod
+from tests.mechanisms.rows import row
 
 RECORD = prototypes.L1
 PLACE = np.array([0.9, 2.7, -0.4])
@@ -22,8 +23,7 @@ class Hung(Model):
     load = Body(m=22.0, J=np.eye(3))
 
     def equations(self):
-        yield connect(self.world.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.load.frame_a)
+        yield from row(self.world, self.rod, self.load)
 
 
 def test_a_rod_gives_way_along_itself_by_both_joints_and_its_tube():

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, translate
+from gantrytau import translate
 from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.mechanics.translational import LinearFriction, TanhFriction
 from gantrytau_models import prototypes
@@ -389,8 +389,8 @@ def test_rods_that_cannot_meet_are_named_when_translated():
 
 
 def test_what_is_not_a_prototype_is_refused():
-    with pytest.raises(
-        (TypeError, ModelError),
-        match=r"found 'L1', expected a prototype record such as prototypes.L1, of `from gantrytau_models import",
-    ):
-        GantryTau("L1")  # pyright: ignore[reportArgumentType]
+    for wrong, words in (("L1", "'L1'"), (prototypes.F1, r"RotatingPrototype\(name='F1'\)")):
+        with pytest.raises(
+            TypeError, match=f"GantryTau: found {words}, expected a Prototype such as prototypes.L1"
+        ):
+            GantryTau(wrong)  # pyright: ignore[reportArgumentType]

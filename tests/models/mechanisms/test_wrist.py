@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Dae, Model, ModelError, connect, simulate, translate
+from gantrytau import Dae, Model, ModelError, simulate, translate
 from gantrytau.mechanics.multibody import FixedRotation, World
 from gantrytau_models import (
     F1WithWrist,
@@ -16,6 +16,7 @@ from gantrytau_models import (
     WithWrist,
     prototypes,
 )
+from tests.mechanisms.rows import row
 from tests.references import f1, six_link
 from tests.references.rotations import turn
 
@@ -152,8 +153,7 @@ class OnAWall(Model):
     wrist = SerialWrist()
 
     def equations(self):
-        yield connect(self.world.frame_b, self.wall.frame_a)
-        yield connect(self.wall.frame_b, self.wrist.frame_a)
+        yield from row(self.world, self.wall, self.wrist)
 
 
 def test_holding_torques_are_those_of_the_weights():
