@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline
 
 from gantrytau import Fixed, Model, ModelError, simulate, sin, translate
 from gantrytau.blocks import Delay, Integrator, Ramp, Table1, Table2
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 XS, YS = [-1.0, 0.0, 0.5, 2.0, 3.0], [2.0, -1.0, 0.0, 4.0, 1.0]
 
@@ -38,11 +38,7 @@ def test_a_table_of_two_arguments():
 
 
 def test_the_kinks_of_a_table_are_exact_in_time():
-    class Looked(Model):
-        ramp, table, memory = Ramp(height=4.0, offset=-1.0), Table1(XS, YS), Integrator()
-
-        def equations(self):
-            yield from row(self.ramp, self.table, self.memory)
+    Looked = in_a_row("Looked", ramp=Ramp(height=4.0, offset=-1.0), table=Table1(XS, YS), memory=Integrator())
 
     found = simulate(Looked(), stop=1.0, points=2, tolerance=1e-10)
     assert found.final("memory.y") == pytest.approx(np.trapezoid(YS, XS) / 4.0, abs=1e-8)

@@ -32,7 +32,7 @@ from gantrytau.blocks import (
     Step,
 )
 from gantrytau.electrical import Ground, Inductor, Resistor, VoltageSource
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 signal: Any = scipy.signal  # most of it is made at run time, out of sight of type checkers
 PERIOD = 0.02
@@ -241,12 +241,7 @@ def test_pulses_of_a_width_make_the_ripple_of_a_winding(duty):
 
 
 def test_a_step_at_an_instant_is_seen_at_the_next():
-    class Switched(Model):
-        step = Step(start_time=5 * PERIOD)
-        hold = SampleHold(period=PERIOD)
-
-        def equations(self):
-            yield connect(self.step.y, self.hold.u)
+    Switched = in_a_row("Switched", step=Step(start_time=5 * PERIOD), hold=SampleHold(period=PERIOD))
 
     found = simulate(Switched(), stop=0.2)
     assert found.at(4.5 * PERIOD, "hold.y") == 0.0

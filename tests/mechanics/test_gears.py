@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, StructureError, simulate, sin, translate
 from gantrytau.mechanics import gears, rotational, translational
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -23,17 +23,16 @@ class Turning(Model):
         yield from row(self.motor, self.rotor, self.gear, self.load, self.damper, self.wall)
 
 
-class Sliding(Model):
-    """A motor turns a rotor, which moves a mass through a gear against a spring."""
-
-    motor = rotational.Torque()
-    rotor = rotational.Inertia(J=0.02)
-    gear = gears.RackAndPinion(radius=0.05)
-    mass = translational.Mass(m=8.0)
-    spring, wall = translational.Spring(c=500.0), translational.Fixed()
-
-    def equations(self):
-        yield from row(self.motor, self.rotor, self.gear, self.mass, self.spring, self.wall)
+# A motor turns a rotor, which moves a mass through a gear against a spring.
+Sliding = in_a_row(
+    "Sliding",
+    motor=rotational.Torque(),
+    rotor=rotational.Inertia(J=0.02),
+    gear=gears.RackAndPinion(radius=0.05),
+    mass=translational.Mass(m=8.0),
+    spring=translational.Spring(c=500.0),
+    wall=translational.Fixed(),
+)
 
 
 SLIDING = {
@@ -88,11 +87,9 @@ def test_one_turn_of_a_ball_screw_is_its_lead():
 
 
 def test_a_ball_screw_holds_a_load_with_little_torque():
-    class Press(Model):
-        motor, screw, load = rotational.Position(), gears.BallScrew(lead=0.01), translational.Force()
-
-        def equations(self):
-            yield from row(self.motor, self.screw, self.load)
+    Press = in_a_row(
+        "Press", motor=rotational.Position(), screw=gears.BallScrew(lead=0.01), load=translational.Force()
+    )
 
     at = translate(Press()).evaluate({"load.f": -2000.0, "motor.phi": 0.3})
     assert at["motor.tau"] == pytest.approx(2000.0 * 0.01 / (2 * np.pi), rel=1e-14)
@@ -111,17 +108,13 @@ def test_an_axis_with_a_ball_screw_speeds_up_evenly():
     np.testing.assert_allclose(found["slide.v"], 0.1 * turn / (12.0 + 2e-4 * turn**2) * found.time, atol=NEAR)
 
 
-class Elastic(Model):
-    """A motor led along a motion, an elastic gear, a load."""
-
-    motor, gear, load = (
-        rotational.Position(),
-        gears.ElasticGear(ratio=10.0, c=50.0, d=0.0),
-        rotational.Inertia(J=2.0),
-    )
-
-    def equations(self):
-        yield from row(self.motor, self.gear, self.load)
+# A motor led along a motion, an elastic gear, a load.
+Elastic = in_a_row(
+    "Elastic",
+    motor=rotational.Position(),
+    gear=gears.ElasticGear(ratio=10.0, c=50.0, d=0.0),
+    load=rotational.Inertia(J=2.0),
+)
 
 
 def test_a_load_swings_behind_an_elastic_gear():

@@ -21,7 +21,7 @@ from gantrytau import (
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody import PointMass, Prismatic, SphericalSpherical, World
 from gantrytau_models.mechanisms.pendulum import Pendulum
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 
 def test_pendulum_has_index_three_and_two_states():
@@ -122,16 +122,13 @@ def test_gears_make_one_inertia_of_two():
 
 
 def test_a_position_source_and_a_force_source_are_inverse_to_each_other():
-    class Moved(Model):
-        source, mass, damper, wall = (
-            translational.Position(),
-            translational.Mass(m=2.0),
-            translational.Damper(d=3.0),
-            translational.Fixed(),
-        )
-
-        def equations(self):
-            yield from row(self.source, self.mass, self.damper, self.wall)
+    Moved = in_a_row(
+        "Moved",
+        source=translational.Position(),
+        mass=translational.Mass(m=2.0),
+        damper=translational.Damper(d=3.0),
+        wall=translational.Fixed(),
+    )
 
     dae = translate(Moved())
     assert dae.states == ()
@@ -212,13 +209,12 @@ def test_speeds_and_accelerations_of_a_given_motion():
 
 
 def test_a_ball_on_a_rod_swings_in_space():
-    class Ball(Model):
-        world = World()
-        rod = SphericalSpherical(L=2.0)
-        body = PointMass(m=3.0, frame_a=dict(r=dict(start=[1.0, 1.0, -1.0])))
-
-        def equations(self):
-            yield from row(self.world, self.rod, self.body)
+    Ball = in_a_row(
+        "Ball",
+        world=World(),
+        rod=SphericalSpherical(L=2.0),
+        body=PointMass(m=3.0, frame_a=dict(r=dict(start=[1.0, 1.0, -1.0]))),
+    )
 
     dae = translate(Ball())
     assert len(dae.states) == 4

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, StructureError, connect, cos, simulate, sin, translate
 from gantrytau.mechanics import rotational
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -163,11 +163,7 @@ def test_sensors_measure_with_the_right_sign_and_disturb_nothing():
 
 @pytest.mark.parametrize("source", [rotational.Position, rotational.Speed])
 def test_a_shaft_held_twice_is_explained(source):
-    class Twice(Model):
-        one, other = source(), rotational.Fixed()
-
-        def equations(self):
-            yield connect(self.one.flange, self.other.flange)
+    Twice = in_a_row("Twice", one=source(), other=rotational.Fixed())
 
     with pytest.raises(
         StructureError,
@@ -183,17 +179,11 @@ def test_misused_sensors_are_explained():
         def equations(self):
             yield from row(self.wall, self.sensor, self.motor)
 
-    class Loose(Model):
-        motor, sensor = rotational.Torque(), rotational.AngleSensor()
+    Loose = in_a_row("Loose", motor=rotational.Torque(), sensor=rotational.AngleSensor())
 
-        def equations(self):
-            yield connect(self.motor.flange, self.sensor.flange)
-
-    class Bridged(Model):
-        left, sensor, right = rotational.Fixed(), rotational.TorqueSensor(), rotational.Fixed()
-
-        def equations(self):
-            yield from row(self.left, self.sensor, self.right)
+    Bridged = in_a_row(
+        "Bridged", left=rotational.Fixed(), sensor=rotational.TorqueSensor(), right=rotational.Fixed()
+    )
 
     for model, words in (
         (Between(), r"sensor\.phi_rel \(a relative sensor carries no torque; connect it beside a component"),

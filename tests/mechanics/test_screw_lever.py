@@ -10,7 +10,7 @@ from gantrytau import Array, Fixed, Model, ModelError, simulate, sin, translate
 from gantrytau.kinematics import TurntableScrew
 from gantrytau.mechanics import gears, rotational
 from gantrytau_models import F1GantryTau, prototypes
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 SCREW = TurntableScrew(base=0.3, crank=0.12, angle=1.2, lead=0.005)
@@ -60,15 +60,12 @@ def test_the_motor_does_the_work_of_both_inertias(swinging):
 
 
 def test_a_motor_that_leads_tells_the_angle_of_the_table():
-    class Led(Model):
-        motor, screw, load = (
-            rotational.Position(),
-            gears.ScrewLever(**dataclasses.asdict(SCREW)),
-            rotational.Torque(),
-        )
-
-        def equations(self):
-            yield from row(self.motor, self.screw, self.load)
+    Led = in_a_row(
+        "Led",
+        motor=rotational.Position(),
+        screw=gears.ScrewLever(**dataclasses.asdict(SCREW)),
+        load=rotational.Torque(),
+    )
 
     dae = translate(Led())
     for theta in (-40.0, 0.0, 3.0, 55.0):

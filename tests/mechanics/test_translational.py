@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, StructureError, connect, cos, simulate, sin, translate
 from gantrytau.mechanics import translational
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -52,14 +52,12 @@ def test_a_spring_damper_is_a_spring_beside_a_damper():
     np.testing.assert_allclose(together["link.f"], apart["spring.f"] + apart["damper.f"], atol=50 * NEAR)
 
 
-class Slowed(Model):
-    """A mass that slides against friction."""
-
-    mass = translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(3.0))
-    friction = translational.TanhFriction(f_c=4.0, f_v=0.0)
-
-    def equations(self):
-        yield connect(self.mass.flange, self.friction.flange)
+# A mass that slides against friction.
+Slowed = in_a_row(
+    "Slowed",
+    mass=translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(3.0)),
+    friction=translational.TanhFriction(f_c=4.0, f_v=0.0),
+)
 
 
 def test_coulomb_friction_slows_evenly_and_viscous_friction_in_proportion():
@@ -149,13 +147,8 @@ def test_sensors_measure_with_the_right_sign_and_disturb_nothing():
     assert translate(Measured()).outputs == outputs
 
 
-class Twice(Model):
-    """Two sources on one flange."""
-
-    one, other = translational.Position(), translational.Fixed()
-
-    def equations(self):
-        yield connect(self.one.flange, self.other.flange)
+# Two sources on one flange.
+Twice = in_a_row("Twice", one=translational.Position(), other=translational.Fixed())
 
 
 @pytest.mark.parametrize("source", [translational.Position, translational.Speed])
@@ -174,17 +167,11 @@ def test_misused_sensors_are_explained():
         def equations(self):
             yield from row(self.wall, self.sensor, self.push)
 
-    class Loose(Model):
-        push, sensor = translational.Force(), translational.PositionSensor()
+    Loose = in_a_row("Loose", push=translational.Force(), sensor=translational.PositionSensor())
 
-        def equations(self):
-            yield connect(self.push.flange, self.sensor.flange)
-
-    class Bridged(Model):
-        left, sensor, right = translational.Fixed(), translational.ForceSensor(), translational.Fixed()
-
-        def equations(self):
-            yield from row(self.left, self.sensor, self.right)
+    Bridged = in_a_row(
+        "Bridged", left=translational.Fixed(), sensor=translational.ForceSensor(), right=translational.Fixed()
+    )
 
     for model, words in (
         (Between(), r"sensor\.s_rel \(a relative sensor carries no force; connect it beside a component"),

@@ -34,7 +34,7 @@ from gantrytau.mechanics import multibody as mb
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.gears import RackAndPinion
 from tests.families import first_of
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 LENGTH, G = 0.5, 9.81  # m, of the load's rope; m/s2
 
@@ -298,14 +298,14 @@ def test_modes_that_turn_to_and_fro_throw_once_each_time():
     assert found.final("v") == pytest.approx(v, rel=1e-6)
 
 
-class Rack(Model):
-    """A wheel of 0.1 m that a rack turns, whose angle is prescribed, with a mass that a damper drags along."""
-
-    drive, gear = rotational.Position(), RackAndPinion(radius=0.1)
-    damper, mass = translational.Damper(d=3.0), translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.0))
-
-    def equations(self) -> Any:
-        yield from row(self.drive, self.gear, self.damper, self.mass)
+# A wheel of 0.1 m that a rack turns, whose angle is prescribed, with a mass that a damper drags along.
+Rack = in_a_row(
+    "Rack",
+    drive=rotational.Position(),
+    gear=RackAndPinion(radius=0.1),
+    damper=translational.Damper(d=3.0),
+    mass=translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.0)),
+)
 
 
 def test_a_damper_passes_on_a_jump_of_its_end_as_an_impulse():
@@ -313,11 +313,7 @@ def test_a_damper_passes_on_a_jump_of_its_end_as_an_impulse():
     assert found.at(1.0, "mass.v") == pytest.approx(3.0 * 0.4 / 2.0, rel=1e-9)  # d * jump / m
 
 
-class Held(Model):
-    drive, mass = translational.Position(), translational.Mass(m=1.0)
-
-    def equations(self) -> Any:
-        yield connect(self.drive.flange, self.mass.flange)
+Held = in_a_row("Held", drive=translational.Position(), mass=translational.Mass(m=1.0))
 
 
 def test_a_position_that_jumps_on_a_mass_is_refused():

@@ -26,7 +26,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.multibody import Fixed as Mount
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 
 
 class Swing(Model):
@@ -175,11 +175,7 @@ def test_joints_that_hang_in_the_air():
 
 
 def test_rotation_without_inertia():
-    class Spindle(Model):
-        world, hinge, mass = World(), Revolute(), PointMass()
-
-        def equations(self):
-            yield from row(self.world, self.hinge, self.mass)
+    Spindle = in_a_row("Spindle", world=World(), hinge=Revolute(), mass=PointMass())
 
     assert "Undetermined: hinge.phi (nothing holds the rotation about its axis)" in refusal(
         Spindle(), StructureError
@@ -187,11 +183,7 @@ def test_rotation_without_inertia():
 
 
 def test_sliding_without_mass():
-    class Empty(Model):
-        world, rail = World(), Prismatic()
-
-        def equations(self):
-            yield connect(self.world.frame_b, self.rail.frame_a)
+    Empty = in_a_row("Empty", world=World(), rail=Prismatic())
 
     assert "Undetermined: rail.s (nothing holds the sliding along its axis)" in refusal(
         Empty(), StructureError
@@ -199,29 +191,23 @@ def test_sliding_without_mass():
 
 
 def test_rotation_between_a_rod_and_a_bar():
-    class Hanging(Model):
-        world, rod, bar, mass = (
-            World(),
-            SphericalSpherical(),
-            FixedTranslation(r=[0.0, 0.0, -1.0]),
-            PointMass(),
-        )
-
-        def equations(self):
-            yield from row(self.world, self.rod, self.bar, self.mass)
+    Hanging = in_a_row(
+        "Hanging",
+        world=World(),
+        rod=SphericalSpherical(),
+        bar=FixedTranslation(r=[0.0, 0.0, -1.0]),
+        mass=PointMass(),
+    )
 
     found = refusal(Hanging(), StructureError)
     assert "bar.frame_a: nothing determines the orientation" in found
     assert "its rotation is free" in found
 
 
-class SpinningBar(Model):
-    """A massless bar in a ball joint, with a point mass at its end: it may spin about itself."""
-
-    world, ball, bar, mass = World(), Spherical(), FixedTranslation(r=[0.0, 0.0, -1.0]), PointMass()
-
-    def equations(self):
-        yield from row(self.world, self.ball, self.bar, self.mass)
+# A massless bar in a ball joint, with a point mass at its end: it may spin about itself.
+SpinningBar = in_a_row(
+    "SpinningBar", world=World(), ball=Spherical(), bar=FixedTranslation(r=[0.0, 0.0, -1.0]), mass=PointMass()
+)
 
 
 def test_rotation_of_a_bar_about_itself_is_named():

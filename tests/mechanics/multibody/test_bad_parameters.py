@@ -7,18 +7,14 @@ from gantrytau import Fixed, GantryTauError, Model, ModelError, Start, Structure
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.multibody import LineForce, PointMass, SphericalSpherical, World
 from tests.mechanics.multibody.test_bad_mechanisms import Driven, Swing, Thrown, refusal
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 from tests.references.rotations import turn
 
 # parameters
 
 
 def test_a_rod_of_negative_length():
-    class Rod(Model):
-        world, rod, mass = World(), SphericalSpherical(L=-1.0), PointMass()
-
-        def equations(self):
-            yield from row(self.world, self.rod, self.mass)
+    Rod = in_a_row("Rod", world=World(), rod=SphericalSpherical(L=-1.0), mass=PointMass())
 
     assert "rod.L: value is -1, expected at least 0 (length between" in refusal(Rod(), ModelError)
     assert "rod (SphericalSpherical): found rod.L = 0; expected a length above zero" in refusal(

@@ -13,7 +13,7 @@ from gantrytau.mechanics.multibody import (
     Spherical,
     World,
 )
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 from tests.references import free_body
 from tests.references.rotations import turn
 
@@ -219,13 +219,9 @@ def test_linked_bodies_without_a_ground_keep_momentum_and_energy():
 def test_an_inertia_that_nobody_gave_is_told():
     """A pendulum of 1 kg at 0.3 m swings at sqrt(g / l) as a point mass; the inertia that is assumed doubles its square."""
 
-    class Swinging(Model):
-        world = World()
-        hinge = Revolute(n=[0.0, 1.0, 0.0])
-        body = Body(m=1.0, r_cm=[0.0, 0.0, -0.3])
-
-        def equations(self):
-            yield from row(self.world, self.hinge, self.body)
+    Swinging = in_a_row(
+        "Swinging", world=World(), hinge=Revolute(n=[0.0, 1.0, 0.0]), body=Body(m=1.0, r_cm=[0.0, 0.0, -0.3])
+    )
 
     (line,) = check(Swinging()).assumed
     assert line.startswith("body.J: nobody gave the inertia, 0.1 kg.m2 about each axis is taken; give J")

@@ -16,7 +16,7 @@ from gantrytau.mechanics.multibody import (
     Universal,
     World,
 )
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row, row
 from tests.references import chain as serial
 from tests.references.rotations import turn
 
@@ -214,15 +214,13 @@ def test_gyroscope_precesses_at_the_rate_of_the_textbook():
     )  # sixty turns; measured 1e-6, falls with the tolerance
 
 
-class OnUniversal(Model):
-    """A body on a universal joint."""
-
-    world = World()
-    joint = Universal(n_a=[1.0, 0.2, 0.0], n_b=[0.0, 1.0, 0.5])
-    body = Body(m=1.3, r_cm=[0.1, 0.2, -0.5], J=np.diag([0.1, 0.2, 0.15]))
-
-    def equations(self):
-        yield from row(self.world, self.joint, self.body)
+# A body on a universal joint.
+OnUniversal = in_a_row(
+    "OnUniversal",
+    world=World(),
+    joint=Universal(n_a=[1.0, 0.2, 0.0], n_b=[0.0, 1.0, 0.5]),
+    body=Body(m=1.3, r_cm=[0.1, 0.2, -0.5], J=np.diag([0.1, 0.2, 0.15])),
+)
 
 
 def test_universal_joint_is_two_revolute_joints():

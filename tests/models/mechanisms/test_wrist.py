@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Dae, Model, ModelError, simulate, translate
+from gantrytau import Dae, ModelError, simulate, translate
 from gantrytau.mechanics.multibody import FixedRotation, World
 from gantrytau_models import (
     F1WithWrist,
@@ -16,7 +16,7 @@ from gantrytau_models import (
     WithWrist,
     prototypes,
 )
-from tests.mechanisms.rows import row
+from tests.mechanisms.rows import in_a_row
 from tests.references import f1, six_link
 from tests.references.rotations import turn
 
@@ -145,15 +145,10 @@ def test_what_holds_the_wrist_is_the_rate_of_its_momentum(robots, name):
         np.testing.assert_allclose(at["wrist.frame_a.t"], torque, atol=1e-7, rtol=0)
 
 
-class OnAWall(Model):
-    """The wrist alone, its mount turned by 0.5 rad about y."""
-
-    world = World()
-    wall = FixedRotation(n=[0.0, 1.0, 0.0], phi=0.5)
-    wrist = SerialWrist()
-
-    def equations(self):
-        yield from row(self.world, self.wall, self.wrist)
+# The wrist alone, its mount turned by 0.5 rad about y.
+OnAWall = in_a_row(
+    "OnAWall", world=World(), wall=FixedRotation(n=[0.0, 1.0, 0.0], phi=0.5), wrist=SerialWrist()
+)
 
 
 def test_holding_torques_are_those_of_the_weights():
