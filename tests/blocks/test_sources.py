@@ -68,10 +68,7 @@ def test_a_sine_follows_its_formula():
         (Pulse(period=0.0), r"source \(Pulse\): found source\.period = 0; expected a period above zero"),
         (Pulse(width=1.5), r"source\.width: value is 1.5, expected at most 1"),
         (Ramp(duration=0.0), "expected a duration above zero; a Step takes no time"),
-        (
-            Sine(frequency=dict(unit="rad/s", value=[1.0, 2.0])),
-            r"source.frequency: value has shape \(2,\), expected \(\)",
-        ),
+        (Sine(frequency=dict(unit="rad/s", value=[1.0, 2.0])), r"source.frequency: value has shape \(2,\)"),
     ],
 )
 def test_wrong_sources(source, words):

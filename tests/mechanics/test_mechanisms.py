@@ -86,9 +86,7 @@ def test_inverse_dynamics_through_an_elastic_joint_need_the_fourth_derivative():
     force, near = (float(x) for x in inverse(0.1, 0.2, 0.3, 0.4, 0.5))
     assert near == pytest.approx(0.1 + 3.0 * 0.3 / 50.0, rel=1e-14)
     assert force == pytest.approx(2.0 * (0.3 + 3.0 * 0.5 / 50.0) + 3.0 * 0.3, rel=1e-13)
-    with pytest.raises(
-        StructureError, match=r"does not determine motor\.f\. Give also der\(der\(der\(der\(far\.s\)\)\)\)"
-    ):
+    with pytest.raises(StructureError, match=r"does not determine motor\.f\. Give also"):
         dae.function(motion[:4], ["motor.f"])
 
 

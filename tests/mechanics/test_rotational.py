@@ -165,10 +165,7 @@ def test_sensors_measure_with_the_right_sign_and_disturb_nothing():
 def test_a_shaft_held_twice_is_explained(source):
     Twice = in_a_row("Twice", one=source(), other=rotational.Fixed())
 
-    with pytest.raises(
-        StructureError,
-        match=r"Undetermined: one\.tau \(something else holds this flange too, as Fixed, Position",
-    ):
+    with pytest.raises(StructureError, match=r"Undetermined: one\.tau \(something else holds this flange"):
         translate(Twice())
 
 

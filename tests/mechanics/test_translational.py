@@ -153,10 +153,7 @@ Twice = in_a_row("Twice", one=translational.Position(), other=translational.Fixe
 
 @pytest.mark.parametrize("source", [translational.Position, translational.Speed])
 def test_a_flange_held_twice_is_explained(source):
-    with pytest.raises(
-        StructureError,
-        match=r"Undetermined: one\.f \(something else holds this flange too, as Fixed, Position or",
-    ):
+    with pytest.raises(StructureError, match=r"Undetermined: one\.f \(something else holds this flange"):
         translate(Twice(one=source()))
 
 

@@ -23,23 +23,11 @@ from tests.simulation.test_simulation import Circuit, Oscillator
         ({"x": 1.0}, "x is not an input of Oscillator (inputs: f)"),
         ({"f": [1.0, 2.0]}, "input f: found 2 values, expected 1"),
         ({"f": math.nan}, "expected finite numbers"),
-        (
-            {"f": "strong"},
-            "input f: found 'strong', expected a number and its unit, as '2.5 kN'",
-        ),
-        (
-            {"f": object()},
-            "expected a number, a function of time, Samples(times, values) or a signal as white_noise",
-        ),
+        ({"f": "strong"}, "input f: found 'strong', expected a number and its unit"),
+        ({"f": object()}, "expected a number, a function of time, Samples(times"),
         ({"f": ([0.0, 1.0], [0.0, math.nan])}, "input f: Samples: row 1 is not finite, expected numbers"),
-        (
-            {"f": ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0])},
-            "input f: Samples: the time falls from 2 s in row 1 to 1 s",
-        ),
-        (
-            {"f": ([0.0], [0.0])},
-            "samples cover 0 to 0 s, expected 0 to 1 s; add samples, or say kind='constant'",
-        ),
+        ({"f": ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0])}, "input f: Samples: the time falls from 2 s in row 1 to"),
+        ({"f": ([0.0], [0.0])}, "samples cover 0 to 0 s, expected 0 to 1 s; add samples"),
         ({"f": ([0.0, 0.5], [0.0, 1.0])}, "samples cover 0 to 0.5 s, expected 0 to 1 s"),
         ({"f": ([0.0, 1.0], [[0.0, 1.0], [1.0, 2.0]])}, "input f: found 2 columns, expected 1"),
         ({"f": math.sin}, "input f: the function of time does not work on a symbol"),
@@ -70,9 +58,7 @@ def test_samples_cannot_be_differentiated():
 
     found = simulate(Differentiator(), stop=1.0, inputs={"u": lambda t: t**2})
     np.testing.assert_allclose(found["v"], 2 * found.time, atol=1e-12)
-    with pytest.raises(
-        ModelError, match="input u is differentiated 1 times by the model, which samples do not allow"
-    ):
+    with pytest.raises(ModelError, match="input u is differentiated 1 times by the model"):
         simulate(Differentiator(), stop=1.0, inputs={"u": ([0.0, 1.0], [0.0, 1.0])})
 
 

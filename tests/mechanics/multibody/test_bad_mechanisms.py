@@ -279,7 +279,5 @@ def test_a_loop_with_more_drives_than_mobility():
     with pytest.raises((StructureError, SolveError)):
         simulate(model, stop=0.5, inputs={"b.s": lambda t: along + 0.2 * t})
     apart = Overdriven(b=dict(s=Start(along + 0.1)), top=dict(phi=Start(2.0)), right=dict(phi=Start(-1.0)))
-    with pytest.raises(
-        StructureError, match=r"more is driven than can move: with the inputs a\.phi, b\.s given"
-    ):
+    with pytest.raises(StructureError, match=r"more is driven than can move: with the inputs a\.phi"):
         simulate(apart, stop=0.5)

@@ -172,10 +172,7 @@ def test_the_critical_gain_divides_quiet_from_hopping(share, least, most):
         (dict(face=dict(tilt=-np.pi / 2)), r"face\.tilt: .* expected at least -0\.523"),
         (dict(face=dict(ripple=0.2)), r"expected flat ripples, 30 degrees at most; are they in m\?"),
         (dict(face=dict(ripple_length=0.0)), "expected ripples longer than nothing"),
-        (
-            dict(control=dict(normal=dict(gate=10.0))),
-            r"control\.normal\.gate: value is 10, expected at most 3\.14",
-        ),
+        (dict(control=dict(normal=dict(gate=10.0))), r"control\.normal\.gate: value is 10"),
     ],
 )
 def test_angles_in_degrees_and_lengths_in_millimetres_are_refused(wrong, words):
