@@ -18,6 +18,7 @@ from gantrytau.ensembles.study_record import Study
 from gantrytau.ensembles.workers.places import Place, outcomes, read_place
 from gantrytau.language.model import Model
 from gantrytau.progress import Progress
+from gantrytau.simulation.simulate import checked_policy
 
 
 def study(
@@ -46,6 +47,7 @@ def study(
     The model is translated once. A case that fails is one of `.failures`; one that ends its process is tried again first.
     Raises ModelError for what is written wrongly, SolveError with `.result`, the cases that are finished, at Ctrl-C.
     """
+    checked_policy("study", policy)
     stop = None if stop is None else number("study", "stop", stop, unit="s")
     axes = read_axes(over, seeds, combine)
     place = read_place(where)

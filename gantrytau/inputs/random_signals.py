@@ -82,9 +82,9 @@ class BinarySequence(HeldSignal):
 
     def __post_init__(self):
         check_seed("prbs", self.seed)
-        whole("prbs", "bits", self.bits, least=min(LAGS), most=max(LAGS))
         for name, unit in (("hold", "s"), ("amplitude", None)):
             object.__setattr__(self, name, number("prbs", name, getattr(self, name), unit=unit, above=0.0))
+        whole("prbs", "bits", self.bits, least=min(LAGS), most=max(LAGS))
 
     def __repr__(self) -> str:
         return f"prbs(bits={self.bits}, hold={self.hold:g}, amplitude={self.amplitude:g}, seed={self.seed})"

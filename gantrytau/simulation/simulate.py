@@ -33,6 +33,9 @@ from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
+NUMBERS: dict[str, dict[str, Any]] = dict(
+    start=dict(unit="s"), tolerance=dict(above=0.0, below=1.0), max_step=dict(unit="s", above=0.0)
+)
 ROUNDS = 3  # of a run whose states prove to be smaller than was thought
 
 
@@ -76,12 +79,9 @@ def simulate(
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     """
-    check_words(simulate, locals())
-    start = number("simulate", "start", start, unit="s")
+    policy = checked_policy("simulate", locals())
+    start, tolerance, max_step = policy["start"], policy["tolerance"], policy["max_step"]
     stop = number("simulate", "stop", stop, unit="s", above=start)
-    tolerance = number("simulate", "tolerance", tolerance, above=0.0, below=1.0)
-    points = whole("simulate", "points", points, least=2)
-    max_step = None if max_step is None else number("simulate", "max_step", max_step, unit="s", above=0.0)
     check_seed("simulate", seed)
     wanted = names(outputs or ())
     dae = _changed(model, parameters, wanted)
@@ -95,6 +95,18 @@ def simulate(
         if doubt:
             warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
     return result
+
+
+def checked_policy(place: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of `simulate` that are given, numbers in SI; ModelError for words and numbers that they cannot be."""
+    check_words(simulate, given, place)
+    found = dict(given)
+    for name, limits in NUMBERS.items():
+        if name in found and not (found[name] is None and name == "max_step"):
+            found[name] = number(place, name, found[name], **limits)
+    if "points" in found:
+        whole(place, "points", found["points"], least=2)
+    return found
 
 
 def _changed(

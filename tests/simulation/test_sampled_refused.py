@@ -62,7 +62,7 @@ HELD = dict(
         ("sampled(self.h, self.h, period=-self.p)", "found p = 0.1; expected a sampling period above zero"),
         ("sampled(self.h, self.h, period=self.x)", "found x in period, expected a number or an expression"),
         ("sampled(self.h, self.h, period=self.r)", "period has shape (2, 1), expected (1, 1)"),
-        ("sampled(self.h, self.h, period=self.c)", "sampled(h), period: units disagree in `c == time`"),
+        ("sampled(self.h, self.h, period=self.c)", "sampled(h), its time: units disagree in `time == c`"),
         ("sampled(self.h, self.h, period=0.1, start=self.x)", "found x in start, expected a number or an"),
         ("sampled(self.h, self.x, period=0.1)", "sampled(h): units disagree in `h == x`"),
         ("sampled(self.h, self.c * self.x + self.v, period=0.1)", "sampled(h): units disagree: `(c*x)` is"),
