@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.estimation.collinear_parameters import LocalSlopes, silent_directions
 from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, Solve, Step, fit_on_mesh
 from gantrytau_optimica.estimation.mesh_error import (
     MeshError,
@@ -19,6 +18,7 @@ from gantrytau_optimica.estimation.mesh_error import (
 )
 from gantrytau_optimica.estimation.residuals import residuals
 from gantrytau_optimica.estimation.weights import Weighing
+from gantrytau_optimica.fitting.rank import LocalJacobian, null_space
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribed_again
 
@@ -95,9 +95,9 @@ def _resolved(fit: MeshFit, error: MeshError) -> bool:
     """Whether the mesh is fine enough to say which parameters the data determine."""
     inner, roots = fit.inner, fit.weights.roots[:, None]
     here, there = (
-        LocalSlopes(j[:, inner] * roots, fit.numbers[inner]) for j in (fit.jacobian, error.jacobian)
+        LocalJacobian(j[:, inner] * roots, fit.numbers[inner]) for j in (fit.jacobian, error.jacobian)
     )
-    return silent_directions(here, fit.sizes[inner], there).resolved
+    return null_space(here, fit.sizes[inner], there).resolved
 
 
 def fit_on(

@@ -63,7 +63,7 @@ class Mixed(Fading):
         (Power, r"only k \* V\^2 is determined"),
         (Sum, r"only k \+ V is determined"),
         (Difference, "only k - V is determined"),
-        (Mixed, "changing k by .* V by .* changes nothing"),
+        (Mixed, r"only k \+ [\d.]+ V \(to first order\) is determined"),
     ],
 )
 def test_parameters_that_only_occur_together(model, words):
@@ -74,7 +74,7 @@ def test_parameters_that_only_occur_together(model, words):
 
 
 def test_a_parameter_without_influence():
-    with pytest.raises(SolveError, match=r"idle has no influence on what was measured\. Leave it out"):
+    with pytest.raises(SolveError, match=r"nothing that was measured depends on idle\. Leave it out"):
         estimate(Fading, {"k": Free(1.0), "idle": Free(1.0)}, DATA)
 
 
