@@ -13,7 +13,7 @@ from gantrytau_optimica import Measurements, pose_sensitivities, sensitivity_tab
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.optimica.calibration.linear_data import carts, six_link_poses, three_link_poses
-from tests.optimica.calibration.refusals import refused
+from tests.optimica.refusals import refused
 
 STEP = 1e-5  # m, of central differences: their error is its square by metres, 1e-9 with rounding
 CLOSE = 3e-9
