@@ -4,7 +4,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gantrytau.border.refusal import Given, ModelError, did_you_mean
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.border.units import Scale, known_scale, scale
 from gantrytau.results.series import Series, split_element
 
@@ -39,15 +40,10 @@ def shown_units(
     measures something else, and for unknown names.
     """
     names = list(dict.fromkeys(names))
-    place = "display"
+    around, place = f"{result.title or 'Result'}: {verb}", "display"
     if display is None:
         display = default
-    if not isinstance(display, (str, Mapping)):
-        raise ModelError(
-            "expected a unit, or units by names, {'phi': 'deg'}",
-            place=f"{result.title or 'Result'}: {verb}",
-            found=Given("display", display),
-        )
+    instance(around, "display", display, (str, Mapping), "a unit, or {name: unit}")
     base = display if display in (SI, DECLARED) else default
     chosen = {name: result.display(name) for name in names} if base == DECLARED else {}
     try:
@@ -57,7 +53,6 @@ def shown_units(
             chosen |= _wherever(result, names, display, place)
         return {name: _shown(result, name, chosen.get(name, ""), place) for name in names}
     except ModelError as error:
-        around = f"{result.title or 'Result'}: {verb}"
         raise ModelError(str(error), place=around, argument="display") from None
 
 

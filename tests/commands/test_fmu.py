@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gantrytau_fmu import Experiment
+from gantrytau_fmu import Build, DefaultExperiment
 from gantrytau_fmu.building.platforms import native
 from tests.fmu.tiny_fmus import FMI2, lag2, running3
 
@@ -106,20 +106,22 @@ def test_options_arrive(run, asked, cart, tmp_path):
     assert type(model).__name__ == "Cart"
     assert policy == {
         "fmi": "2.0",
-        "platforms": ("native", "win64"),
         "solver": "rodas4",
         "interfaces": ("co-simulation",),
         "given": ("x",),
         "find": ("f", "v", "der(v)"),
         "states": ("v",),
         "tolerance": 1e-7,
-        "sources": False,
-        "description": "a cart",
-        "author": "A. Author",
-        "copyright": "2026 A. Author",
-        "license": "MIT",
-        "version": "1.2",
-        "experiment": Experiment(stop=2.0, step=0.5, tolerance=1e-7),
+        "build": Build(
+            description="a cart",
+            author="A. Author",
+            copyright="2026 A. Author",
+            license="MIT",
+            version="1.2",
+            platforms=("native", "win64"),
+            sources=False,
+            experiment=DefaultExperiment(stop=2.0, step=0.5, tolerance=1e-7),
+        ),
     }
 
 
@@ -128,20 +130,13 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
     ((_, policy),) = asked
     assert policy == {
         "fmi": "3.0",
-        "platforms": ("native",),
         "solver": "dopri5",
         "interfaces": ("model-exchange", "co-simulation"),
         "given": (),
         "find": (),
         "states": None,
         "tolerance": 1e-6,
-        "sources": True,
-        "description": "",
-        "author": "",
-        "copyright": "",
-        "license": "",
-        "version": "",
-        "experiment": None,
+        "build": Build(),
     }
 
 

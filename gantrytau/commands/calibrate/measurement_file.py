@@ -9,7 +9,7 @@ import numpy as np
 
 from gantrytau import Model
 from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail, refusing
-from gantrytau.commands.printing.spelling import spelled
+from gantrytau.commands.printing.spelling import RUNNING, spelled
 from gantrytau_optimica import (
     CalibrationError,
     CrossValidation,
@@ -18,7 +18,6 @@ from gantrytau_optimica import (
     calibrate,
     cross_validate,
     held_out,
-    in_lines,
 )
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
@@ -48,10 +47,13 @@ class MeasurementFile:
         """The line of each row, (N,)."""
         return np.arange(len(self.data)) if self.data.lines is None else self.data.lines
 
-    def words(self, message: str, said: Sequence[Finding | CalibrationError]) -> str:
-        """A message with lines in place of rows."""
-        rows = [one.rows for one in said if one.kind != OF_GUIDEWAYS]
-        return in_lines(message, rows, self.lines) if rows else message
+    def of_file(self, one: Any) -> Any:
+        """A finding or an error with lines in place of rows."""
+        return one if one.kind == OF_GUIDEWAYS else one.in_lines(self.lines)
+
+    def words(self, finding: Finding) -> str:
+        """A finding with lines in place of rows, and options in place of arguments."""
+        return "".join(RUNNING.get().part(part) for part in self.of_file(finding).parts)
 
 
 def calibrated(
@@ -79,7 +81,7 @@ def calibrated(
             json,
             kind="SolveError",
         )
-    told = tuple(replace(f, message=measured.words(f.message, [f])) for f in found.findings)
+    told = tuple(replace(f, sentence=measured.words(f)) for f in found.findings)
     if policy["loss"] == "linear":
         _refuse_outliers(float(found.error), told, measured, json)
     return replace(checked, calibration=found.with_findings(told))
@@ -103,9 +105,9 @@ def _refuse_outliers(
 
 
 def _refuse(error: CalibrationError, measured: MeasurementFile, json: bool) -> NoReturn:
-    message = measured.words(spelled(error), [error, *error.findings])
+    message = spelled(measured.of_file(error))
     others = [f for f in error.findings if f.kind != error.kind]
-    more = "".join(f"\n  {f.kind}: {measured.words(f.message, [f])}" for f in others)
+    more = "".join(f"\n  {f.kind}: {measured.words(f)}" for f in others)
     rows = [] if error.kind == OF_GUIDEWAYS else measured.lines[error.rows]
     fail(
         f"{measured.path}: {message}{more}\nNothing was written",

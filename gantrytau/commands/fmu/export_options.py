@@ -30,6 +30,8 @@ OPTIONS = dict(
     fmi="Version of the standard.",
     solver=typer.Option(help="Of Co-Simulation; rodas4 for stiff models.", rich_help_panel=EXPERIMENT),
     tolerance=typer.Option(help="Relative, of Co-Simulation.", rich_help_panel=EXPERIMENT),
+)
+BUILD = dict(
     description=_about("What the file says of the model.", "the model's"),
     author=_about("Who wrote the model."),
     copyright=_about("Whose the model is."),

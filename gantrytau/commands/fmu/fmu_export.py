@@ -16,10 +16,11 @@ from gantrytau.commands.arguments.values import check_names
 from gantrytau.commands.fmu import export_options
 from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, answered, busy, note, refusing, reporting
-from gantrytau_fmu import Experiment, check_target, export_fmu, read_fmu
+from gantrytau_fmu import Build, DefaultExperiment, check_target, export_fmu, read_fmu
 
 
 @serves(export_fmu, **export_options.OPTIONS)
+@serves(Build, **export_options.BUILD)
 def export(
     model: ModelName,
     to: Annotated[
@@ -49,12 +50,15 @@ def export(
             "find": listed(find),
             "states": listed(states) or None,
         }
-        policy |= names | {
-            "interfaces": export_options.INTERFACES[interface],
-            "platforms": listed(platforms) or ("native",),
-            "sources": not no_sources,
-            "experiment": _experiment(stop, step, policy["tolerance"]),
-        }
+        about = {name: policy.pop(name) for name in export_options.BUILD}
+        experiment = _experiment(stop, step, policy["tolerance"])
+        wanted = Build(
+            **about,
+            platforms=listed(platforms) or ("native",),
+            sources=not no_sources,
+            experiment=experiment,
+        )
+        policy |= names | {"interfaces": export_options.INTERFACES[interface], "build": wanted}
         chosen = build(model, prototype, set_ or ())
         flat = flatten(chosen.model)
         for argument, asked in names.items():
@@ -65,21 +69,21 @@ def export(
         begin = time.perf_counter()
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            with busy(f"exporting {chosen.name} for {', '.join(policy['platforms'])}"):
+            with busy(f"exporting {chosen.name} for {', '.join(wanted.platforms)}"):
                 export_fmu(chosen.model, file, **policy)
         told = list(dict.fromkeys(str(warning.message) for warning in caught))
         _answer(chosen.record("model"), file, time.perf_counter() - begin, told, json)
 
 
-def _experiment(stop: float | None, step: float | None, tolerance: float) -> Experiment | None:
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> DefaultExperiment | None:
     """The default experiment, None if nothing is said of it; CommandError for a step that does not fit."""
     if stop is None and step is None:
         return None
-    usual = Experiment()
+    usual = DefaultExperiment()
     stop = stop or usual.stop or 1.0
     if step is not None and not 0 < step <= stop:
         raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
-    return Experiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)
+    return DefaultExperiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)
 
 
 def _answer(chosen: dict[str, Any], file: Path, seconds: float, told: list[str], json: bool) -> None:

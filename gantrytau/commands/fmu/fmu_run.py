@@ -14,7 +14,7 @@ from gantrytau.commands.arguments.values import pairs, signal
 from gantrytau.commands.fmu.fmu_info import FmuFile, is_system, present
 from gantrytau.commands.printing import picture_output, result_output
 from gantrytau.commands.printing.reporting import CommandError, answered, noted, reporting
-from gantrytau_fmu import UnconnectedInputs, cosimulate, run_fmu
+from gantrytau_fmu import Master, UnconnectedInputs, cosimulate, run_fmu
 
 SHOWN = 24  # variables in the table; files and JSON have all
 
@@ -70,7 +70,10 @@ def run(
         try:
             with noted(UnconnectedInputs, told, json):
                 if is_system(file):
-                    result = cosimulate(file, order=order or "gauss-seidel", isolate=isolate, **policy)
+                    master = Master(
+                        order=order or "gauss-seidel", isolate=isolate, tolerance=policy.pop("tolerance")
+                    )
+                    result = cosimulate(file, master=master, **policy)
                 else:
                     result = run_fmu(file, model_exchange=model_exchange, isolate=isolate, **policy)
         except SolveError as error:

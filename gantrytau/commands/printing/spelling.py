@@ -47,6 +47,10 @@ class Spelling:
             return option or str(given)
         return f"{option} {shell(given.value)}" if option[0] == "-" else f"{option} = {short(given.value)}"
 
+    def part(self, part: object) -> str:
+        """A part of a sentence."""
+        return self.write(part) if isinstance(part, Given) else str(part)
+
     def message(self, error: GantryTauError) -> str:
         """An error, without its place where that is the function which found it."""
         words, option = error.words(self.write), self.options.get(error.argument or "")
