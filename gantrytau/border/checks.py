@@ -32,7 +32,7 @@ def check_words(function: Callable[..., Any], values: Mapping[str, Any], place: 
     """ModelError for an argument of `function` whose `Literal` does not list the value found."""
     for argument, words in literals(function).items():
         if argument in values:
-            one_of(place or function.__name__, argument, values[argument], words)
+            one_of(function.__name__ if place is None else place, argument, values[argument], words)
 
 
 @cache

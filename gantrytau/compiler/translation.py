@@ -72,21 +72,13 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
     known = tuple(n for n in scalars if n not in parameters)
     variables = {n for v in flat.variables for n in v.elements}
     for name in known:
-        if name.startswith("der("):
-            raise ModelError(
-                f"given: {name} is a derivative, expected variables; name the variable itself",
-                argument="given",
-            )
+        why = "is set at instants (by sampled, when or stick_slip); leave it out, it is known anyway"
         if name not in variables:
-            raise ModelError(
-                f"given: {name} is no variable, but follows from others; name those", argument="given"
-            )
-        if name in events:
-            raise ModelError(
-                f"given: {name} is set at instants (by sampled, when or stick_slip), expected another variable; leave it "
-                "out, it is known anyway",
-                argument="given",
-            )
+            derived = name.startswith("der(")
+            why = "is a derivative; name the variable" if derived else "follows from others; name those"
+        elif name not in events:
+            continue
+        raise ModelError(f"{name} {why}, expected variables", place="given", argument="given")
     table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
     return table, (*(known or flat.inputs), *events)
 

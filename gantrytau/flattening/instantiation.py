@@ -184,25 +184,20 @@ class _Builder:
                 f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
                 f"model; expected another name, as {full}_left"
             )
-        attributes = {
-            key: Leaf(getattr(declaration, key), instance)
-            for key in ATTRIBUTES
-            if getattr(declaration, key, None) is not None
-        }
+        declared = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
+        attributes = {key: Leaf(value, instance) for key, value in declared.items() if value is not None}
         if (
             isinstance(modification, Leaf)
             and isinstance(modification.value, Quantity)
             and not modification.value.name
         ):
             # an unnamed declaration replaces this one: mass=Free(9.0)
-            new = modification.value
-            said = {key: getattr(new, key, None) for key in ATTRIBUTES}
-            attributes |= {
-                key: Leaf(value, modification.scope)
-                for key, value in said.items()
-                if value is not None and not (isinstance(value, str) and value == "")
+            declaration = modification.value
+            said = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
+            stated = {
+                key: x for key, x in said.items() if x is not None and not (isinstance(x, str) and x == "")
             }
-            declaration = new
+            attributes |= _wrap(stated, modification.scope)
         elif modification is not None:
             changes = _attributes(modification, full)
             if isinstance(declaration, Parameter) and changes.keys() & {"start", "fixed"}:
@@ -239,8 +234,7 @@ class _Builder:
                     raise ModelError(
                         f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found "
                         f"{' and '.join(self.paths[id(x)] for x in found)}, each a {kind}, of which "
-                        f"{self.paths[id(instance)]} cannot choose one; expected one {kind}; for other frames that do not "
-                        "move take Fixed"
+                        f"{self.paths[id(instance)]} cannot choose, expected one; other frames that do not move are Fixed"
                     )
                 if found and found[0] is not instance:
                     instance.__dict__[name] = found[0]
@@ -249,8 +243,7 @@ class _Builder:
                 place = self.paths[id(instance)] or type(instance).__name__
                 kind = wanted.component.__name__
                 raise ModelError(
-                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, "
-                    "expected one; "
+                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, expected one; "
                     f"declare `{kind.lower()} = {kind}()` in the body of {type(around[0]).__name__}"
                 )
 
@@ -285,8 +278,7 @@ def _attributes(modification: Any, path: str) -> dict[str, Leaf]:
     """The attributes that a modification of a variable or parameter sets."""
     if isinstance(modification, Leaf):
         if isinstance(modification.value, (Start, Bounds)):
-            found = modification.value.attributes()
-            return {key: Leaf(value, modification.scope) for key, value in found.items() if value is not None}
+            return _wrap_value(modification.value, modification.scope)
         if isinstance(modification.value, (Declared, Array)):
             raise ModelError(f"{path}: found a component as modification of a quantity, expected a value")
         return {"value": modification}
@@ -302,7 +294,7 @@ def _wrap(modifications: Mapping[str, Any], scope: Any) -> dict[Any, Any]:
 
 def _wrap_value(value: Any, scope: Any) -> Any:
     if isinstance(value, (Start, Bounds)):  # attributes, so that one does not erase the other
-        return {key: Leaf(x, scope) for key, x in value.attributes().items() if x is not None}
+        return _wrap(value.attributes(), scope)
     if isinstance(value, Mapping):
         return _wrap(value, scope)
     if isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value):

@@ -77,7 +77,7 @@ HELD = dict(
             "found x in period, expected a number or an expression of param",
         ),
         ("sampled(self.h, self.h, period=self.r)", "period has shape (2, 1), expected (1, 1)"),
-        ("sampled(self.h, self.h, period=self.c)", "sampled(h), period: units disagree in `c == time`"),
+        ("sampled(self.h, self.h, period=self.c)", "sampled(h), its time: units disagree in `time == c`"),
         (
             "sampled(self.h, self.h, period=0.1, start=self.x)",
             "found x in start, expected a number or an expr",

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.building.platforms import native
 from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
@@ -44,6 +45,7 @@ def check_fmu(
     run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
     no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
     """
+    number("check_fmu", "timeout", timeout, above=0.0, unit="s")
     path = Path(path)
     return [replace(finding, path=str(path)) for finding in errors_first(_found(path, run, timeout))]
 
@@ -56,7 +58,7 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
         model = model_of(files)
         fmu = describe(files, model)
     except ModelError as error:
-        return [FmuFinding("error", str(error).removeprefix(f"{path}: "))]
+        return [FmuFinding("error", str(error))]
     findings = list(inconsistencies(fmu, files, model))
     for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined

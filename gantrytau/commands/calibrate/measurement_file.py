@@ -43,12 +43,9 @@ class MeasurementFile:
         """The line of each row, (N,)."""
         return np.arange(len(self.data)) if self.data.lines is None else self.data.lines
 
-    def words(self, message: str, said: "Sequence[Finding | CalibrationError]") -> str:
-        """A message with lines in place of rows, and options in place of arguments."""
-        from gantrytau_optimica import in_lines
-
-        rows = [one.rows for one in said if one.kind != OF_GUIDEWAYS]
-        return SPELLING.words(in_lines(message, rows, self.lines) if rows else message)
+    def of_file(self, one: "Finding | CalibrationError") -> Any:
+        """A finding or an error with lines in place of rows, and options in place of arguments."""
+        return one if one.kind == OF_GUIDEWAYS else one.in_lines(self.lines)
 
 
 def calibrated(
@@ -78,7 +75,7 @@ def calibrated(
             json,
             kind="SolveError",
         )
-    told = tuple(replace(f, message=measured.words(f.message, [f])) for f in found.findings)
+    told = tuple(replace(f, sentence=SPELLING.words(measured.of_file(f).message)) for f in found.findings)
     if policy["loss"] == "linear":
         _refuse_outliers(float(found.error), told, measured, json)
     return replace(checked, calibration=found.with_findings(told))
@@ -102,9 +99,9 @@ def _refuse_outliers(
 
 
 def _refuse(error: "CalibrationError", measured: MeasurementFile, json: bool) -> NoReturn:
-    message = measured.words(str(error), [error, *error.findings]).replace("Measurements: ", "", 1)
+    message = SPELLING.words(measured.of_file(error).words(str))
     others = [f for f in error.findings if f.kind != error.kind]
-    more = "".join(f"\n  {f.kind}: {measured.words(f.message, [f])}" for f in others)
+    more = "".join(f"\n  {f.kind}: {SPELLING.words(measured.of_file(f).message)}" for f in others)
     rows = [] if error.kind == OF_GUIDEWAYS else measured.lines[error.rows].tolist()
     fail(
         f"{measured.path}: {message}{more}\nNothing was written",

@@ -15,7 +15,6 @@ from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
     CalibrationVerdict,
     judge,
     told_by_tool,
-    um,
 )
 from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation
 from gantrytau_optimica.calibration.calibration import Calibration
@@ -23,7 +22,7 @@ from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.tool_error import ToolError, tool_error
-from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.finding import Finding, length_text
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
 from gantrytau_optimica.procedure.monte_carlo import matched
@@ -107,8 +106,9 @@ class MeasuredPlan(Record):
             yield Finding(
                 "noise",
                 found.rows,
-                f"what is left needs noise of {um(found.noise)} in each coordinate, {um(foretold)} are foretold of the "
-                "device; look at the other findings, at its settings, and whether robot and target stood still",
+                f"what is left needs noise of {length_text(found.noise)} in each coordinate, {length_text(foretold)} are "
+                "foretold of the device; look at the other findings, at its settings, and whether robot and target stood "
+                "still",
             )
 
     @property

@@ -231,8 +231,8 @@ def test_another_robot_and_too_few_poses(fails, measured, poses):
         (("--method", "newton"), "--method newton: expected 'gauss-newton' or 'ipopt'"),
         (("--start", "there"), "--start there: expected 'nominal' or 'linear'"),
         (("--holdout", "third"), "expected second or none"),
-        (("--orientation", "fixed"), "--orientation fixed: expected 'local' or 'unit' or 'free'"),
-        (("--model", "6"), "--model 6: expected no --model, 'parallel', or 1 to 5"),
+        (("--orientation", "fixed"), "--orientation fixed: expected 'local', 'unit' or 'free'"),
+        (("--model", "6"), "--model 6: expected 'parallel', 1, 2, 3, 4, 5"),
         (("--prior", "length"), "--prior length: expected NAME=DEVIATION"),
         (("--prior", "length=0"), "the deviation above 0"),
         (

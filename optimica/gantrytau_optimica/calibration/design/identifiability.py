@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gantrytau import Model, ModelError, StructureError
+from gantrytau.border.checks import array, check_words, number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.links.arm_factors import (
@@ -135,7 +136,8 @@ def identifiability(
     for nothing.
     Raises ModelError for another robot, or for arrays that do not fit.
     """
-    check_deviations(noise, angle, tape)
+    check_words(identifiability, locals())
+    check_deviations("identifiability", noise, angle, tape)
     poses, _ = finite_poses(measurements)
     return Identifiability(
         tuple(_of_arm(arm, poses, (noise, angle), tape) for arm in read_arms(robot, orientation, gains=gains))
@@ -158,19 +160,10 @@ def measured_poses(measurements: Any) -> PoseArrays:
 def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
     """The poses of measurements whose numbers are finite, and their rows; ModelError if there are none."""
     found = measured_poses(measurements)
-    try:
-        q, r = (np.asarray(each, dtype=float) for each in (found.q, found.r))
-        R = None if found.R is None else np.asarray(found.R, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(
-            "measurements: found q, r or R that hold no numbers, expected arrays of them"
-        ) from None
+    q = array("measurements", "q", found.q, (None, None), finite=False)
+    r = array("measurements", "r", found.r, (len(q), 3), finite=False)
+    R = None if found.R is None else array("measurements", "R", found.R, (len(q), 3, 3), finite=False)
     arrays = [q, r, *([] if R is None else [R])]
-    if any(each.ndim < 2 or len(each) != len(q) for each in arrays):
-        shapes = ", ".join(str(each.shape) for each in arrays)
-        raise ModelError(
-            f"measurements: found arrays of the shapes {shapes}, expected q (N, n), r (N, 3), R (N, 3, 3)"
-        )
     rows = np.flatnonzero(
         np.all([np.isfinite(each).all(axis=tuple(range(1, each.ndim))) for each in arrays], axis=0)
     )
@@ -181,16 +174,11 @@ def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
     return PoseArrays(q[rows], r[rows], None if R is None else R[rows]), rows
 
 
-def check_deviations(noise: float, angle: float, tape: float) -> None:
+def check_deviations(place: str, noise: float, angle: float, tape: float) -> None:
     """ModelError for standard deviations of measurement and tape that are not above zero, or of angles below it."""
-    for name, value, least in (
-        ("noise", noise, "above 0"),
-        ("tape", tape, "above 0"),
-        ("angle", angle, "0 or more"),
-    ):
-        number = isinstance(value, int | float | np.number) and np.isfinite(value)
-        if not number or value < 0 or (value == 0 and name != "angle"):
-            raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
+    number(place, "noise", noise, above=0.0)
+    number(place, "angle", angle, least=0.0)
+    number(place, "tape", tape, above=0.0)
 
 
 def _of_arm(

@@ -13,9 +13,9 @@ from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.diagnostics.link_systems import LinkSystem, closure_series, link_systems
-from gantrytau_optimica.calibration.diagnostics.order_effects import ENDS
 from gantrytau_optimica.calibration.diagnostics.outliers import Suspicion, suspicion
 from gantrytau_optimica.calibration.diagnostics.plausibility import Misses
+from gantrytau_optimica.calibration.diagnostics.row_effects import ENDS
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
 from gantrytau_optimica.calibration.fitting.covariance import as_told, joint_covariance, link_noise
 from gantrytau_optimica.calibration.fitting.named_parameters import (

@@ -11,18 +11,20 @@ An arm without turntables is one of (4.14), or of (4.13) where the plate cannot 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import check_words
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import about, cross, skewed
 from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods, read_nominal
 
 Orientation = Literal["local", "unit", "free"]
-ORIENTATIONS = ("local", "unit", "free")
+ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +261,7 @@ def read_arms(
     orientations, and joints on the arm; 10, 24 and 38 of an F1 with quaternions. What the robot says is given is not.
     Raises ModelError for a model without `rods()`, another orientation, or a quaternion that is not unit where it has to be.
     """
+    check_words(read_arms, locals())
     return arms_of(read_nominal(robot), orientation, gains=gains)
 
 
@@ -266,10 +269,6 @@ def arms_of(
     nominal: NominalRods, orientation: Orientation = "local", *, gains: bool = False
 ) -> tuple[ArmClosure, ...]:
     """The same of a robot whose parameters are known."""
-    if orientation not in ORIENTATIONS:
-        raise ModelError(
-            f"orientation: found {orientation!r}, expected one of {', '.join(map(repr, ORIENTATIONS))}"
-        )
     columns = iter(range(len(nominal.arms), len(nominal.rods.joints)))
     found = []
     for cart, arm in enumerate(nominal.arms):
@@ -296,10 +295,8 @@ def _closure_of(
     for table in tables:
         norm = float(np.linalg.norm(values[table.orientation]))
         if orientation != "free" and abs(norm - 1.0) > 1e-9:
-            raise ModelError(
-                f"{table.orientation}: found a quaternion of length {norm:.6g}, expected 1; normalise it, or say "
-                "orientation='free'"
-            )
+            found = f"found a quaternion of length {norm:.6g}, expected 1; normalise it, or take "
+            raise ModelError(found, Given("orientation", "free"), place=table.orientation)
     free = [name for name in names if name not in nominal.rods.given]
     free += [f"{table.name}.gain" for table in tables] if gains else []
     lengths = np.array([float(values[rod.length]) for rod in rods])

@@ -19,7 +19,7 @@ from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, starte
 from gantrytau_optimica.calibration.fitting.priors import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
 
@@ -50,8 +50,10 @@ def usable(
     there = np.isfinite(tool(measurements.q[rows], tool.nominal)[0]).all(axis=1)
     if not there.all():
         lost = rows[~there]
-        words = f"the nominal robot has no pose at q of {rows_in_words(lost)}; {agreeing(lost, 'they are')} left out"
-        findings.append(Finding("no pose", lost, words))
+        left = f"; {agreeing(lost, 'they are')} left out"
+        findings.append(
+            Finding("no pose", lost, ("the nominal robot has no pose at q of ", Rows(lost), left))
+        )
     return Usable(tool, rows[there], findings)
 
 

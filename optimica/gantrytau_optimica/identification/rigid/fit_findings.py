@@ -56,7 +56,7 @@ def usable_parts(
         where = f"log {number}: " if len(logs) > 1 else ""
         ends = "; here they are put in again" if mended is not log else ""
         findings += [
-            replace(f, message=f"{where}{f.message}{ends if f.kind == 'lost rows' else ''}") for f in told
+            replace(f, sentence=f"{where}{f.message}{ends if f.kind == 'lost rows' else ''}") for f in told
         ]
     if not kept:
         raise IdentificationError(
@@ -76,7 +76,7 @@ def beside_robot(
         return []
     kinds = {one.kind for one in known}
     return [
-        replace(f, message=f"log {number}: {f.message}" if len(logs) > 1 else f.message)
+        replace(f, sentence=f"log {number}: {f.message}" if len(logs) > 1 else f.message)
         for number, log in enumerate(logs)
         for f in check_motion(dae, log)
         if f.kind not in kinds

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
+from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
 
@@ -155,8 +155,8 @@ def _comments(plan: PosePlan, carts: str, trigger: str) -> list[str]:
         "before the start, and after each stop begin there again.",
         _waiting(trigger),
         f"Expected error of the tool by noise after calibration with all {len(plan.prediction.rows)} poses of the plan "
-        f"{um(plan.prediction.error)}; of the worst simulated robot {um(plan.verdict.error)}, wanted "
-        f"{um(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
+        f"{length_text(plan.prediction.error)}; of the worst simulated robot {length_text(plan.verdict.error)}, wanted "
+        f"{length_text(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
         f"Poses: {CRITERION}.",
         f"Nominal parameters in m ({plan.kind}):",
         *_parameters(plan),
