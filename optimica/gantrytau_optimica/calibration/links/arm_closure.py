@@ -127,10 +127,8 @@ class ArmClosure(Record):
         places = {name: place for name, (place, _) in self.layout.items()}
         jacobian = np.zeros((len(q), len(self.lengths), max(place.stop for place in places.values())))
         for j, rod in enumerate(self.said.rods):
-            on_plate = self.vector_of(rod.plate_offset)
             places_of = frames.places(rod)
-            d = r + (on_plate if R is None else R @ on_plate) - places_of[0]
-            length = self.values[rod.length]
+            d, length = self._on_plate(rod, r, R) - places_of[0], self.values[rod.length]
             errors[:, j] = (np.einsum("ni,ni->n", d, d) - length**2) / (2 * self.lengths[j])
             g = d / self.lengths[j]
             for name, column in frames.columns(rod, g, R, places_of, -length / self.lengths[j]):
@@ -148,11 +146,14 @@ class ArmClosure(Record):
         """(B_j - A_j) / L_j^0 of all links, the derivatives of the closure errors by T, (N, m, 3)."""
         frames = _Frames(self, q)
         found = []
-        for j, rod in enumerate(self.said.rods):
-            on_plate = self.vector_of(rod.plate_offset)
-            d = r + (on_plate if R is None else R @ on_plate) - frames.places(rod)[0]
-            found.append(d / self.lengths[j])
+        for rod, length in zip(self.said.rods, self.lengths, strict=True):
+            found.append((self._on_plate(rod, r, R) - frames.places(rod)[0]) / length)
         return np.stack(found, axis=1)
+
+    def _on_plate(self, rod: SingleRod, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """The joint B_j in the world, (N, 3)."""
+        on_plate = self.vector_of(rod.plate_offset)
+        return r + (on_plate if R is None else R @ on_plate)
 
 
 class _Frames:

@@ -91,11 +91,6 @@ class ArmLink(Record):
         """Orientations of the plate."""
         return self.poses.R
 
-    @property
-    def size(self) -> int:
-        """How many numbers it depends on."""
-        return self.poses.arm.count
-
     def error(self, p: np.ndarray) -> np.ndarray:
         """e, (N,) in m."""
         return self.poses.closure(p)[0][:, self.j]
@@ -121,11 +116,6 @@ class ArmLink(Record):
     def told(self, p: np.ndarray) -> np.ndarray | None:
         """Derivatives of the numbers that are reported by those that are moved; None for the same."""
         return self.poses.told(p)
-
-    def at(self, rows: np.ndarray) -> "ArmLink":
-        """The link over some of the poses."""
-        here = self.poses
-        return self.over(here.q[rows], here.r[rows], None if here.R is None else here.R[rows])
 
     def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "ArmLink":
         """The link over other poses."""

@@ -1,6 +1,7 @@
 """Kinematics of calibrated models, those with measured guideways and directions of single links included."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -149,7 +150,7 @@ class CalibratedKinematics:
                 [(np.sum(self._vector(k, q, r, R) ** 2, axis=1) - k.length**2) / 2 for k in self.links],
                 axis=1,
             )
-            step = _solve(self._slopes(q, r, R), error)
+            step = newton_steps(self._slopes(q, r, R), error)
             size = np.abs(step).max(axis=1)
             step = (
                 step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
@@ -204,8 +205,9 @@ def _straight_position(link: RodLink, joint: np.ndarray, place: np.ndarray, v: n
         return (p - np.sqrt(p * p - square * (np.sum(d * d, axis=1) - link.length**2))) / square
 
 
-def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    try:
-        return np.linalg.solve(matrix, right[..., None])[..., 0]
-    except np.linalg.LinAlgError:  # one singular pose must not stop the others
-        return np.einsum("nij,nj->ni", np.linalg.pinv(matrix), right)
+def newton_steps(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Steps (N, k) of least norm: where a pose is singular, or the plate is not held, these are as good as any."""
+    if matrices.shape[1] == matrices.shape[2]:
+        with suppress(np.linalg.LinAlgError):
+            return np.linalg.solve(matrices, right[..., None])[..., 0]
+    return (np.linalg.pinv(matrices) @ right[..., None])[..., 0]

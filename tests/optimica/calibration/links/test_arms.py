@@ -222,7 +222,7 @@ def test_what_cannot_be_an_arm_is_refused():
 @pytest.mark.parametrize(
     ("change", "argument", "names"),
     [
-        (dict(prior={"arms[2].lenght": 1e-3}), "prior", "did you mean 'arms[2].links[0].length"),
+        (dict(prior={"arms[2].lenght": 1e-3}), "prior", "did you mean 'arms[2]."),
         (dict(prior={"arms[2].offset": 0.0}), "prior", "arms[2].offset"),
         (dict(prior=[1.0]), "prior", "a dict"),
         (dict(q=np.zeros((185, 4))), "q", "185 x 4"),
