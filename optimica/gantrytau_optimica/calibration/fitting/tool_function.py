@@ -45,7 +45,7 @@ class ToolFunction(Record):
         found = self._function(*self._arguments(q, p))
         return found[0], found[1].reshape(-1, 3, 3).transpose(0, 2, 1) if self.turning else None
 
-    def slopes(self, q: Array, p: Array) -> Array:
+    def jacobian(self, q: Array, p: Array) -> Array:
         """Derivatives by the parameters of the place, and of a turn in the world where it is asked for, (N, 3 or 6, k)."""
         by_all = self._function.jacobian(*self._arguments(q, p))[:, :, len(self.joints) :]
         if not self.turning:

@@ -60,7 +60,7 @@ class Chain(Record):
         y = self.vector(p)
         return np.einsum("ij,ij->i", y, y) - p[0] ** 2
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """de/dp, (N, 7 or 10)."""
         y = self.vector(p)
         found = np.empty((len(y), self.size))
@@ -145,7 +145,7 @@ class Condensed:
         """U theta(p), at most 31 rows."""
         return self.upper @ self._functions(p)
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """U dtheta/dp."""
         A, v = p[OFFSET] + self.centre_q * p[ALONG] - self.centre_r, p[ALONG]
         parts = [
@@ -233,9 +233,9 @@ class Weighted:
         """Weighted e, (N,)."""
         return self.weights * self.chain.error(p)
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """Their derivatives, (N, 7 or 10)."""
-        return self.weights[:, None] * self.chain.slopes(p)
+        return self.weights[:, None] * self.chain.jacobian(p)
 
 
 def triangle(

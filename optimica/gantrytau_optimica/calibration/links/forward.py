@@ -112,7 +112,7 @@ class CalibratedKinematics:
         """dq/dpose, (N, arms, 3), or (N, links, 6) with rotations about the world axes where the plate turns."""
         r, R, single = self._pose(r, R)
         q = np.atleast_2d(self.ik(r, R))
-        found = self._slopes(q, r, R)
+        found = self._by_pose(q, r, R)
         along = np.stack(
             [
                 np.einsum("ni,ni->n", self._vector(k, q, r, R), k.guideway.slope(q[:, k.arm]))
@@ -134,7 +134,7 @@ class CalibratedKinematics:
         """From the joint on the cart to that on the plate, (N, 3)."""
         return r + R @ link.on_plate - link.guideway.at(q[:, link.arm])
 
-    def _slopes(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+    def _by_pose(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Half the derivatives of the closure errors by the pose, (N, links, 3 or 6)."""
         rows = []
         for link in self.links:
@@ -150,7 +150,7 @@ class CalibratedKinematics:
                 [(np.sum(self._vector(k, q, r, R) ** 2, axis=1) - k.length**2) / 2 for k in self.links],
                 axis=1,
             )
-            step = newton_steps(self._slopes(q, r, R), error)
+            step = newton_steps(self._by_pose(q, r, R), error)
             size = np.abs(step).max(axis=1)
             step = (
                 step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
