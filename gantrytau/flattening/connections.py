@@ -82,9 +82,8 @@ def _path(instance: Instance, end: Any, where: str) -> str:
         return instance.path(end)
     except KeyError:
         raise ModelError(
-            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of "
-            "this model, "
-            "expected a connector reached through self"
+            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of this model, expected "
+            "a connector reached through self"
         ) from None
 
 
@@ -97,9 +96,8 @@ def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
         ]
         missing = sorted(a ^ b)[0]
         raise ModelError(
-            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: "
-            f"'{missing}' is in "
-            f"one of them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
+            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: '{missing}' is in one of "
+            f"them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
         )
 
 

@@ -62,7 +62,7 @@ class ArmFunctions(ModelFunctions):
 
     def rates(self, r, R: Any = None):
         """Velocity and angular velocity of the tool by rates of the joints, (N, 6, n)."""
-        return twists(self._forward.slopes(*self.ik(r, R)[0].T), R)
+        return twists(self._forward.jacobian(*self.ik(r, R)[0].T), R)
 
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each."""
@@ -88,7 +88,7 @@ class ArmFunctions(ModelFunctions):
     def _minors(self, q: np.ndarray) -> np.ndarray:
         """Determinants of the rows of the Jacobian that are independent at the start, (N,)."""
         rows = independent(self._home_rates)
-        return np.linalg.det(twists(self._forward.slopes(*q.T), self.fk(q)[1])[:, rows])
+        return np.linalg.det(twists(self._forward.jacobian(*q.T), self.fk(q)[1])[:, rows])
 
     @cached_property
     def _roots(self) -> dict[int, np.ndarray]:
@@ -113,7 +113,7 @@ class ArmFunctions(ModelFunctions):
 
     @property
     def _home_rates(self) -> np.ndarray:
-        return twists(self._forward.slopes(*self.home.q[:, None]), self.home.R[None])[0]
+        return twists(self._forward.jacobian(*self.home.q[:, None]), self.home.R[None])[0]
 
     @cached_property
     def _branch(self) -> FollowedBranch:

@@ -200,10 +200,8 @@ class Quantity(Formula):
             found = self
         if found is self or isinstance(found, Quantity):
             raise ModelError(
-                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which "
-                "is not a "
-                f"member of {type(scope).__name__}; refer to a parameter of the class that holds the "
-                "expression"
+                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which is not a member of "
+                f"{type(scope).__name__}; refer to a parameter of the class that holds the expression"
             )
         return found
 
@@ -363,7 +361,7 @@ class Start:
 
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
-        return dict(start=self.value, fixed=self.fixed)
+        return dict(start=self.value, fixed=self.fixed) if self.value is not None else dict(fixed=self.fixed)
 
 
 class Fixed(Start):
@@ -384,7 +382,7 @@ class Bounds:
 
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
-        return dict(min=self.min, max=self.max)
+        return {key: limit for key, limit in (("min", self.min), ("max", self.max)) if limit is not None}
 
 
 def is_setting(value: Any, name: str) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gantrytau.border.refusal import ModelError
-from gantrytau_fmu import Experiment
+from gantrytau_fmu import Build, DefaultExperiment
 from gantrytau_fmu.building.platforms import PLATFORMS, native
 from tests.fmu.tiny_fmus import FMI2, lag2, pack, running3
 
@@ -114,27 +114,29 @@ def test_options_arrive(run, asked, cart, tmp_path):
     assert type(model).__name__ == "Cart"
     assert policy == {
         "fmi": "2.0",
-        "platforms": ("native", "win64"),
         "solver": "rodas4",
         "interfaces": ("co-simulation",),
         "given": ("x",),
         "find": ("f", "v", "der(v)"),
         "states": ("v",),
         "tolerance": 1e-7,
-        "sources": False,
-        "description": "a cart",
-        "author": "A. Author",
-        "copyright": "2026 A. Author",
-        "license": "MIT",
-        "version": "1.2",
-        "experiment": Experiment(stop=2.0, step=0.5, tolerance=1e-7),
+        "build": Build(
+            description="a cart",
+            author="A. Author",
+            copyright="2026 A. Author",
+            license="MIT",
+            version="1.2",
+            platforms=("native", "win64"),
+            sources=False,
+            experiment=DefaultExperiment(stop=2.0, step=0.5, tolerance=1e-7),
+        ),
     }
 
 
 def test_a_short_experiment_has_a_short_step(run, asked, cart, tmp_path):
     run("fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu", "--stop", "0.001")
     ((_, policy),) = asked
-    assert policy["experiment"] == Experiment(stop=0.001, step=0.001)
+    assert policy["build"].experiment == DefaultExperiment(stop=0.001, step=0.001)
 
 
 def test_the_help_lists_the_platforms(run):
@@ -148,20 +150,13 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
     ((_, policy),) = asked
     assert policy == {
         "fmi": "3.0",
-        "platforms": ("native",),
         "solver": "dopri5",
         "interfaces": ("model-exchange", "co-simulation"),
         "given": (),
         "find": (),
         "states": None,
         "tolerance": 1e-6,
-        "sources": True,
-        "description": "",
-        "author": "",
-        "copyright": "",
-        "license": "",
-        "version": "",
-        "experiment": None,
+        "build": Build(),
     }
 
 
@@ -210,7 +205,7 @@ def test_an_unknown_platform_is_told(fails, cart, tmp_path):
     message = fails(
         MISUSE, "fmu", "export", f"{cart}:Cart", "--to", tmp_path / "a.fmu", "--platforms", "amiga"
     )
-    assert message.startswith("--platforms: found 'amiga', expected one of native, all")
+    assert message.startswith("--platforms amiga: expected 'native', 'all'")
     assert not (tmp_path / "a.fmu").exists()
 
 

@@ -123,11 +123,7 @@ def test_an_input_that_is_driven_twice():
 
 
 def test_more_is_given_than_can_be_chosen():
-    message = refused(Axis(), given=["tau", "rotor.w"])
-    assert (
-        "More is given than can be chosen; leave out rotor.w or tau" in message
-        or "leave out rotor.w" in message
-    )
+    assert "More is given than can be chosen; leave out rotor.w" in refused(Axis(), given=["tau", "rotor.w"])
     assert "leave out rotor.phi or rotor.w" in refused(Axis(), given=["rotor.w", "rotor.phi"])
     assert translate(Axis(), given=["rotor.w"]).known == ("rotor.w",)
 

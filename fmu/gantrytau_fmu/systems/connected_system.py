@@ -7,7 +7,7 @@ from typing import Any
 
 from gantrytau.border.dimensions import BASE, dimension
 from gantrytau.border.refusal import ModelError, did_you_mean
-from gantrytau_fmu.systems.component import Component, Scalar, numeric
+from gantrytau_fmu.systems.component import Component, Scalar, dotted, numeric
 from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units
 
 SHOWN, FEW = 6, 5  # names that a message lists, and with their values
@@ -70,12 +70,12 @@ def build_system(
     drives = _drives(components, inputs, span)
     taken: dict[Place, str] = {}
     for target, by in [
-        *((link.target, ".".join(link.source)) for link in links),
+        *((link.target, dotted(*link.source)) for link in links),
         *((place, "inputs") for place in drives),
     ]:
         if target in taken:
             raise ModelError(
-                f"{'.'.join(target)} is driven by {taken[target]} and by {by}, expected one of them; "
+                f"{dotted(*target)} is driven by {taken[target]} and by {by}, expected one of them; "
                 "leave the other one out"
             )
         taken[target] = by
@@ -86,7 +86,7 @@ def unconnected(system: ConnectedSystem) -> dict[str, str]:
     """Inputs that are numbers and that nothing drives, whose start nobody chose, by dotted name: the values they keep."""
     driven = {link.target for link in system.links} | set(system.drives)
     return {
-        f"{owner}.{name}": _shown(component.scalars[name].start)
+        dotted(owner, name): _shown(component.scalars[name].start)
         for owner, component in system.components.items()
         for name in component.of("input")
         if (owner, name) not in driven and name not in system.start[owner]
@@ -123,14 +123,14 @@ def locate(components: Mapping[str, Component], name: str, causality: str = "") 
     """
     if not isinstance(name, str):
         raise ModelError(f"found {name!r}, expected a name as 'component.variable'")
-    owners = [owner for owner in components if name.startswith(f"{owner}.")]
+    owners = [owner for owner in components if name.startswith(dotted(owner, ""))]
     if not owners:
         choice = list(components)
         raise ModelError(
             f"'{name}' begins with no component of the system{did_you_mean(name.partition('.')[0], choice)}"
         )
     owner = max(owners, key=len)
-    return [(owner, scalar) for scalar in components[owner].expand(name[len(owner) + 1 :], causality)]
+    return [(owner, scalar) for scalar in components[owner].expand(name[len(dotted(owner, "")) :], causality)]
 
 
 def _links(
@@ -229,7 +229,7 @@ def _starts(
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
             if not known.has_start:
                 raise ModelError(_calculated(components[owner], known), argument="start")
-            _check_start(f"{owner}.{scalar}", known, number)
+            _check_start(dotted(owner, scalar), known, number)
             found[owner][scalar] = number
     return found
 
@@ -261,7 +261,7 @@ def _calculated(component: Component, scalar: Scalar) -> str:
     more = ", ..." if len(free) > SHOWN else ""
     words = f"such as {', '.join(free[:SHOWN])}{more}" if free else "of which this FMU has none"
     return (
-        f"start {component.name}.{scalar.name} is a {scalar.variability} {scalar.causality} that is calculated, "
+        f"start {dotted(component.name, scalar.name)} is a {scalar.variability} {scalar.causality} that is calculated, "
         f"expected a parameter, an input, or a state or other variable with a start value, {words}"
     )
 
@@ -304,7 +304,7 @@ def _drives(
                     argument="inputs",
                 )
         value = without_units("inputs", name, value, components[places[0][0]].scalars[places[0][1]].unit)
-        drives = drives_of(name, value, len(places), span)
+        drives = drives_of("inputs", name, value, len(places), span)
         found.update(zip(places, drives, strict=True))
     return found
 

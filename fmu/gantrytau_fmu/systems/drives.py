@@ -47,18 +47,21 @@ def between(knots: np.ndarray, begin: float, size: float) -> list[tuple[float, f
     return [(low, high - low) for low, high in pairwise(times)]
 
 
-def drives_of(name: str, value: Any, count: int, span: tuple[float, float]) -> list[Drive]:
-    """What drives the elements of an input.
+def drives_of(argument: str, name: str, value: Any, count: int, span: tuple[float, float]) -> list[Drive]:
+    """What drives the elements of an input, given as `argument`.
 
     value: number, array, function of time, Samples, (times, values) or a signal; span: begin and stop in s, which samples
     have to cover. Raises ModelError for what is none of these.
     """
-    course = with_course(name, value, (count,) if count > 1 else (), lambda: span)
-    if callable(course):
-        return _functions(name, course, count, span[0])
+    try:
+        course = with_course(name, value, (count,) if count > 1 else (), lambda: span)
+    except ModelError as error:
+        raise error.within(argument) from error
     if isinstance(course, Samples):
-        return _samples(name, course, count, span)
-    return [Drive(lambda t, x=number: x) for number in numbers_of("inputs", name, course, count)]
+        return _samples(f"{argument} {name}", course, count, span)
+    if callable(course):
+        return _functions(argument, name, course, count, span[0])
+    return [Drive(lambda t, x=number: x) for number in numbers_of(argument, name, course, count)]
 
 
 def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
@@ -109,29 +112,32 @@ def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:
     return [float(number) for number in numbers]
 
 
-def _functions(name: str, function: Callable[[float], Any], count: int, begin: float) -> list[Drive]:
+def _functions(
+    argument: str, name: str, function: Callable[[float], Any], count: int, begin: float
+) -> list[Drive]:
     """A function for each element, tried at the beginning."""
-    _value(name, function, begin, count)
-    return [Drive(lambda t, k=k: _value(name, function, t, count)[k]) for k in range(count)]
+
+    def value(t: float) -> list[float]:
+        try:
+            found = function(t)
+        except USERS_ERRORS as error:  # whatever a function of the user raises
+            raise ModelError(
+                f"the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value at every "
+                "time of the simulation",
+                place=f"{argument} {name}",
+                argument=argument,
+            ) from error
+        return numbers_of(argument, f"{name} at t = {t:.6g} s", found, count)
+
+    value(begin)
+    return [Drive(lambda t, k=k: value(t)[k]) for k in range(count)]
 
 
-def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
-    try:
-        value = function(t)
-    except USERS_ERRORS as error:  # whatever a function of the user raises
-        raise ModelError(
-            f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
-            "at every time of the simulation",
-            argument="inputs",
-        ) from error
-    return numbers_of("inputs", f"{name} at t = {t:.6g} s", value, count)
-
-
-def _samples(name: str, samples: Samples, count: int, span: tuple[float, float]) -> list[Drive]:
+def _samples(place: str, samples: Samples, count: int, span: tuple[float, float]) -> list[Drive]:
     """Columns of samples; those of a matrix in the order of its elements, row after row."""
     if len(samples.shape) == 1 or samples.values.shape[1] != count:
-        samples.check_shape(f"input {name}", (count,) if count > 1 else ())
-    samples.check_cover(f"input {name}", *span)
+        samples.check_shape(place, (count,) if count > 1 else ())
+    samples.check_cover(place, *span)
     order = np.arange(count).reshape(*reversed(samples.shape)).T.ravel()
     held = samples.kind == "constant"
     return [

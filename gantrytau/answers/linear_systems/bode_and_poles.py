@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from gantrytau.answers.linear_systems.poles_and_zeros import in_s
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:
@@ -80,23 +81,21 @@ def beside_each_other(
     """A system under its title, and others by their names; ModelError for what is none, or of another shape."""
     found: dict[str, Any] = {system.title: system}
     place = f"{system.title}.{verb}"
-    expected = "systems or measured spectra" if spectra else "systems"
-    if not isinstance(beside, Mapping | None):
-        raise ModelError(
-            f"{place}: found beside={type(beside).__name__}, expected {expected} by their names, {{'measured': ...}}"
-        )
-    for label, other in (beside or {}).items():
-        if label in found:
-            raise ModelError(f"{place}: found the name {label!r} twice; give the other one a name of its own")
+    expected = (
+        f"{'systems or measured spectra' if spectra else 'systems'} by other names, {{'measured': ...}}"
+    )
+    for label, other in instance(place, "beside", beside or {}, Mapping, expected).items():
         measured = spectra and hasattr(other, "hertz")
-        if not measured and not (hasattr(other, "poles") and hasattr(other, "outputs")):
-            raise ModelError(f"{place}: found {label}={type(other).__name__}, expected {expected}")
+        known = measured or (hasattr(other, "poles") and hasattr(other, "outputs"))
+        if label in found or not known:
+            raise ModelError(f"expected {expected}", place=place, found=Given("beside", beside))
         shape = np.shape(other.response)[:2] if measured else (len(other.outputs), len(other.inputs))
         own = (len(system.outputs), len(system.inputs))
         if spectra and shape != own:
-            raise ModelError(
-                f"{place}: found {shape[0]} outputs and {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
+            words = (
+                f"found {shape[0]} outputs and {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
             )
+            raise ModelError(words, place=place, argument="beside")
         found[label] = other
     return found
 
@@ -136,10 +135,8 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
         check_suffix(file)
     rows, columns = len(system.outputs), len(system.inputs)
     if not 0 < rows * columns <= MOST:
-        raise ModelError(
-            f"{system.title}: plot_bode found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name "
-            "fewer in inputs= and outputs="
-        )
+        words = f"found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name fewer in "
+        raise ModelError(words, Given("inputs"), " and ", Given("outputs"), place=f"{system.title}.plot_bode")
     figure, axes = plt.subplots(
         2 * rows,
         columns,

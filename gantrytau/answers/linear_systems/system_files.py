@@ -70,10 +70,6 @@ def save_system(system: Saved, path: str | os.PathLike[str]) -> Path:
             f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}",
             argument="path",
         )
-    if not path.absolute().parent.is_dir():
-        raise ModelError(
-            f"{path}: the folder '{path.parent}' does not exist; create it first", argument="path"
-        )
     with replacing(path) as partial:
         writer(system, partial)
     return path

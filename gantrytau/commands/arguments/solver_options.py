@@ -27,8 +27,8 @@ Points = Annotated[
 Scheme = Annotated[
     str,
     typer.Option(
-        metavar="radau|gauss",
-        autocompletion=words("radau", "gauss"),
+        metavar="radau|gauss|lobatto",
+        autocompletion=words("radau", "gauss", "lobatto"),
         help="Kind of points.",
         rich_help_panel=MESH,
     ),

@@ -15,7 +15,7 @@ INTERFACES = {
 }
 VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
 SPELLING = Spelling(
-    ("export_fmu", "translate"),
+    ("export_fmu", "translate", "Build"),
     {name: f"--{name}" for name in ("platforms", "given", "find", "states", "tolerance", "solver", "fmi")},
 )
 

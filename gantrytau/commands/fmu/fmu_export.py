@@ -18,7 +18,7 @@ from gantrytau.commands.fmu.fmu_info import counted
 from gantrytau.commands.printing.reporting import CommandError, as_json, busy, note, refusing, reporting
 
 if TYPE_CHECKING:
-    from gantrytau_fmu import Experiment
+    from gantrytau_fmu import DefaultExperiment
 
 
 def export(
@@ -51,7 +51,7 @@ def export(
     Which way the model is solved is your choice: given the tool's position and finding the forces, the FMU is
     inverse dynamics. It needs a C compiler here, or the extra 'cross' of gantrytau; without one, only sources are written.
     """
-    from gantrytau_fmu import SOLVERS
+    from gantrytau_fmu import SOLVERS, Build
 
     with reporting(json, source_of(model), export_options.SPELLING):
         policy: dict[str, Any] = {
@@ -60,17 +60,19 @@ def export(
             or _unknown("--interface", interface, export_options.INTERFACES),
             "solver": solver if solver in SOLVERS else _unknown("--solver", solver, SOLVERS),
             "tolerance": tolerance,
-            "platforms": listed(platforms) or ("native",),
             "given": listed(given),
             "find": listed(find),
             "states": listed(states) or None,
-            "sources": not no_sources,
-            "description": description,
-            "author": author,
-            "copyright": copyright_,
-            "license": license_,
-            "version": model_version,
-            "experiment": _experiment(stop, step, tolerance),
+            "build": Build(
+                description=description,
+                author=author,
+                copyright=copyright_,
+                license=license_,
+                version=model_version,
+                platforms=listed(platforms) or ("native",),
+                sources=not no_sources,
+                experiment=_experiment(stop, step, tolerance),
+            ),
         }
         chosen = build(model, prototype, set_ or ())
         flat = flatten(chosen.model)
@@ -83,19 +85,19 @@ def export(
         _show(chosen, file, time.perf_counter() - begin, told, json)
 
 
-def _experiment(stop: float | None, step: float | None, tolerance: float) -> "Experiment | None":
-    """The default experiment (`Experiment`), None if nothing is said of it; CommandError for times that are none."""
+def _experiment(stop: float | None, step: float | None, tolerance: float) -> "DefaultExperiment | None":
+    """The default experiment (`DefaultExperiment`), None if nothing is said of it; CommandError for times that are none."""
     if stop is None and step is None:
         return None
-    from gantrytau_fmu import Experiment
+    from gantrytau_fmu import DefaultExperiment
 
     if stop is not None and not 0 < stop < math.inf:
         raise CommandError(f"--stop {stop:g}: expected a time above 0, in s")
-    usual = Experiment()
+    usual = DefaultExperiment()
     stop = stop or usual.stop or 1.0
     if step is not None and not 0 < step <= stop:
         raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
-    return Experiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)
+    return DefaultExperiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)
 
 
 def _unknown(option: str, found: str, expected: Any) -> Any:
@@ -122,7 +124,7 @@ def _exported(chosen: Chosen, file: Path, policy: dict[str, Any]) -> list[str]:
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        platforms = ", ".join(policy["platforms"])
+        platforms = ", ".join(policy["build"].platforms)
         with busy(f"exporting {chosen.name} for {platforms}"):
             export_fmu(chosen.model, file, **policy)
     return list(dict.fromkeys(str(warning.message) for warning in caught))

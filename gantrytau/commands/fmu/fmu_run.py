@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gantrytau import Result
 
 SPELLING = Spelling(
-    ("cosimulate", "run_fmu"),
+    ("cosimulate", "run_fmu", "Master"),
     {name: f"--{name}" for name in ("stop", "step", "order", "tolerance", "isolate", "seed")}
     | {"start": "--set", "inputs": "--input"},
     flags=("isolate",),
@@ -145,10 +145,11 @@ def _result(file: Path, policy: Mapping[str, Any], *, order: str, me: bool, isol
         from gantrytau_fmu import run_fmu
 
         return run_fmu(file, model_exchange=me, isolate=isolate, **policy)
-    from gantrytau_fmu import cosimulate
+    from gantrytau_fmu import Master, cosimulate
 
     chosen: Any = order
-    return cosimulate(file, order=chosen, isolate=True if isolate else (), **policy)
+    master = Master(order=chosen, isolate=isolate, tolerance=policy["tolerance"])
+    return cosimulate(file, master=master, **{name: policy[name] for name in policy if name != "tolerance"})
 
 
 def _show(summary: Mapping[str, Any], result: "Result") -> None:

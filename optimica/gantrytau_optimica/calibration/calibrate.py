@@ -26,7 +26,7 @@ from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.plausibility import Fitting, Misses, check_robot, misses_of
 from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
-from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.links.arm_closure import Orientation, arms_of
 from gantrytau_optimica.calibration.links.error_models import (
     check_model,
@@ -142,7 +142,10 @@ def _on_rods(
     check_carts(nominal_rods, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
     fits, known, there = _fitted(nominal_rods, measurements.select(fitted), asked, (rows, fitted, findings))
-    fits = fits if method == "gauss-newton" else _by_ipopt(fits, constraints)
+    if method == "ipopt":
+        from gantrytau_optimica.calibration.fitting.ipopt_fit import solve
+
+        fits = solve(fits, constraints)
     found = Calibration(
         nominal_rods=nominal_rods,
         measurements=measurements,
@@ -161,12 +164,6 @@ def _on_rods(
         found = replace(found, constraints=tuple(read_constraints(constraints, found.names)))
     told = [] if there is None or asked.start == "linear" else [other_frame(there, rows)]
     return found.with_findings([*findings, *told, *judged(found)])
-
-
-def _by_ipopt(fits: list[Fit], constraints: Mapping[str, Any] | None) -> list[Fit]:
-    from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
-
-    return solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
 
 
 @dataclass(frozen=True)
@@ -212,7 +209,9 @@ def _fitted(
         raise not_in_base(robot, there, rows)
     directions = asked.start if there is None else "linear"
     values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
-    fits = fit_model(asked.model, links, data, directions, Prior(asked.prior, values), asked.loss)
+    fits = fit_model(
+        asked.model, links, data, start=directions, prior=asked.prior, nominal=values, loss=asked.loss
+    )
     return fits, misses_of(nominal) if asked.start == "nominal" else None, there
 
 

@@ -20,7 +20,7 @@ from gantrytau_optimica.transcription.layout import Layout
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
 FINE, FINEST = 1e-7, 1e-11  # of its size, without and with deviations of the data
@@ -66,8 +66,7 @@ class MeshError:
 def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
     """What the mesh costs; None where the motion on a finer one is not found. known: deviations of the data were given."""
     program = fit.residuals.program
-    problem, layouts = program.problem, program.places.layouts
-    finer = residuals(transcribe(problem, halved(fit), layouts[0].scheme))
+    finer = residuals(transcribed_again(program, meshes=halved(fit)))
     near = carried_over(program, fit.w, finer.program)
     w = finer.on_manifold(near, fit.numbers)
     if w is None:
@@ -87,8 +86,8 @@ def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
     parts[:, inner] = finer.defects(near, -inverse * roots)
     lost = np.sum((fit.errors * roots) ** 2) - np.sum(left**2)
     return MeshError(
-        finer, w, slopes, shift, _by_element(finer, layouts, parts), deviations, _allowed(deviations, fit, known),
-        misfit=bool(known and lost > SCATTER * np.sqrt(2 * left.size)),
+        finer, w, slopes, shift, _by_element(finer, program.places.layouts, parts), deviations,
+        _allowed(deviations, fit, known), misfit=bool(known and lost > SCATTER * np.sqrt(2 * left.size)),
     )  # fmt: skip
 
 

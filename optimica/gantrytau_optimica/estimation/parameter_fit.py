@@ -15,7 +15,7 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
-from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
+from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
 from gantrytau_optimica.fitting.robust import robust_deviation
 

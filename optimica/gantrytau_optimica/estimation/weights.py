@@ -13,11 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from gantrytau_optimica.fitting.robust import robust_deviation
+from gantrytau_optimica.fitting.robust import huber_weights, robust_deviation
 
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
 FEWEST = 2  # degrees of freedom from which an output has its own noise; below, it is that of the others
-HUBER = 1.345  # deviations beyond which errors count linearly: 95 % as efficient where noise is normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,7 @@ class Weighing:
         noise = before.noise if self.known else self._noise(errors, jacobian, before)
         if self.loss == "squares":
             return Weights(noise, before.huber)
-        return Weights(noise, np.minimum(1.0, HUBER * noise / np.maximum(np.abs(errors), 1e-300)))
+        return Weights(noise, huber_weights(errors / noise))
 
     def _noise(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> np.ndarray:
         mine = [np.flatnonzero(self.outputs == g) for g in range(self.count)]

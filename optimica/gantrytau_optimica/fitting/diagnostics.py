@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
+from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.facts import Fact
 from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays

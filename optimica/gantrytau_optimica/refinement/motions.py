@@ -18,7 +18,7 @@ from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
 from gantrytau_optimica.refinement.remesh import divided
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 DOUBLED = 3  # times that elements are halved
 DOUBTFUL = 0.1  # of its size: first-order estimate of a state's deviation from which inputs are played back
@@ -55,8 +55,11 @@ def stopped_told(found: Optimum) -> Optimum:
 
 def _missed(found: Optimum) -> str:
     """What inputs miss by more than its size, in words; "" of a motion, or of an answer that is none."""
-    scheme = found.program.places.layouts[0].scheme.scheme
-    if not found.success or scheme == "shooting" or not any(map(_doubtful, found.phases.values())):
+    if (
+        not found.success
+        or not found.program.scheme.refinable
+        or not any(map(_doubtful, found.phases.values()))
+    ):
         return ""
     if not found.playback.complete:  # algebraics may be singular between two points that the solution passes
         plain = not any(one.phase.algebraics for one in found.phases.values())
@@ -108,11 +111,10 @@ def _doubtful(trajectory: Trajectory) -> bool:
 
 def _doubled(found: Optimum) -> Program:
     """The program on elements of half the length, inputs in the pieces that they have."""
-    layouts = found.program.places.layouts
-    meshes = [layout.mesh for layout in layouts]
+    meshes = found.program.meshes
     halved = [
         replace(m, borders=divided(m.borders, np.full(m.elements, 2)), moving=tuple(2 * k for k in m.moving))
         for m in meshes
     ]
     problem = with_pieces(found.program.problem, meshes, lambda _, own, mesh: kept_pieces(own, mesh))
-    return transcribe(problem, halved, layouts[0].scheme)
+    return transcribed_again(found.program, problem, halved)

@@ -16,7 +16,7 @@ from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
@@ -220,13 +220,13 @@ def solved_by_arcs(
     if known:
         problem = with_arcs(problem, trajectories, meshes)
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+    program = transcribed_again(optimum.program, problem, meshes, located)
     held = held_at_limits(program, trajectories) if known else program
     if np.sum(held.lbg == held.ubg) > np.sum(
         held.lbw < held.ubw
     ):  # each arc at a limit leaves less to choose
         problem = without_following(replace(optimum.built, problem=problem))
-        program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+        program = transcribed_again(optimum.program, problem, meshes, located)
         held = held_at_limits(program, trajectories) if known else program
     if np.sum(held.lbg == held.ubg) > np.sum(held.lbw < held.ubw):
         return None
@@ -295,8 +295,7 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
     """The solution on other meshes, from this one, or None if it is not found."""
     trajectories = list(optimum.phases.values())
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    scheme = optimum.program.places.layouts[0].scheme
-    program = transcribe(optimum.program.problem, meshes, scheme, located)
+    program = transcribed_again(optimum.program, meshes=meshes, located=located)
     better = solve(program, warm_start(trajectories, program))
     return better if better.success else None
 

@@ -15,7 +15,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem, Limit
 from gantrytau_optimica.solving.ipopt import Solution, objective_size
 from gantrytau_optimica.transcription.point_functions import share_of
 from gantrytau_optimica.transcription.program import Program
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 Solve = Callable[[Program, np.ndarray], Solution]
 
@@ -50,11 +50,9 @@ def unsettled(program: Program, solution: Solution) -> Solution:
 
 def located(program: Program, w: np.ndarray, held: tuple[Limit, ...] = ()) -> Program:
     """The program with all values read from the elements in which their times lie at unknowns w; held: more conditions."""
-    layouts = program.places.layouts
-    borders = [layout.placed(w).borders for layout in layouts]
+    borders = [layout.placed(w).borders for layout in program.places.layouts]
     problem = replace(program.problem, boundary=(*_own(program.problem), *held))
-    meshes = [layout.mesh for layout in layouts]
-    return transcribe(problem, meshes, layouts[0].scheme, (w[program.places.free], borders))
+    return transcribed_again(program, problem, located=(w[program.places.free], borders))
 
 
 def _own(problem: ControlProblem) -> tuple[Limit, ...]:

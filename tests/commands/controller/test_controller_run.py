@@ -160,7 +160,7 @@ WRONG = [
     (
         'law = "',
         'kinematics = "cell.py:three"\nlaw = "',
-        "cell.toml: kinematics: found 3, expected ExternalKinematics(",
+        "found kinematics=3, expected ExternalKinematics(",
     ),
     ("clients", "client", "cell.toml: there is no key 'client'; did you mean 'clients'?"),
     ('["cell.py:probe"]', "[3]", "cell.toml: clients: found 3, expected names in quotes"),
@@ -191,7 +191,7 @@ WRONG = [
     (
         "at = 0.16",
         "at = -1",
-        "cell.toml: event[1]: controller: found at=-1, expected a time in s, 0 or later",
+        "found at=-1, expected a number of at least 0",
     ),
     (
         "[references]\nq_ref = 0.1",

@@ -18,7 +18,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.describing.description_checks import initial_of
 from gantrytau_fmu.describing.model_description import LOG_CATEGORIES, build_description, model_description
 from gantrytau_fmu.describing.xml_text import plain
-from gantrytau_fmu.description import Experiment, FmuDescription, FmuTerminal, FmuVariable, Unknown
+from gantrytau_fmu.description import DefaultExperiment, FmuDescription, FmuTerminal, FmuVariable, Unknown
 from tests.fmu.interfaces import DESCRIPTIONS, VERSIONS, description, fmu, gain, oscillator, read, relay, said
 
 ROOT = Path(__file__).parents[3]
@@ -297,8 +297,8 @@ def with_lists(**changes):
         (with_kind(identifier="a b"), "'a b' is no C name"),
         (with_(interfaces=()), "expected 'model-exchange', 'co-simulation' or both"),
         (with_kind(kind="scheduled-execution"), "expected 'model-exchange'"),
-        (with_(experiment=Experiment(stop=np.inf)), "expected finite numbers"),
-        (with_(experiment=Experiment(step=0.0)), "tolerance and step above zero"),
+        (with_(experiment=DefaultExperiment(stop=np.inf)), "expected finite numbers"),
+        (with_(experiment=DefaultExperiment(step=0.0)), "tolerance and step above zero"),
     ],
 )
 def test_what_no_fmu_can_say_is_refused(change, message):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import simulate
-from gantrytau_fmu import export_fmu
-from gantrytau_fmu.systems.cosimulate import cosimulate
+from gantrytau_fmu import Master, cosimulate, export_fmu
 from gantrytau_models import prototypes
 from gantrytau_models.control.plant import MeasuredGantryTau
 from gantrytau_models.control.tracking import ControlledRobot, TrackingController
@@ -59,7 +58,7 @@ def test_a_smooth_reference_from_outside_is_followed_within_the_hold(system, tar
             stop=0.5,
             step=step,
             inputs={"controller.r_ref": reference},
-            steps={"controller": step / 4},
+            master=Master(steps={"controller": step / 4}),
         )
         return found["robot.tool.r"][:: round(4e-3 / step)]
 

@@ -114,10 +114,10 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
         ),
         (
             ["--step", "0"],
-            "--step 0: expected more than 0 and at most the 1 s that are simulated; choose such a step",
+            "--step 0.0: expected more than 0 and at most the 1 s that are simulated; choose such a step",
         ),
-        (["--stop", "-1"], "--stop -1: expected a time after the beginning at 0 s; choose a later one"),
-        (["--tolerance", "2"], "--tolerance 2.0: expected a number between 0 and 1, as 1e-8"),
+        (["--stop", "-1"], "--stop -1.0: expected a time after the beginning at 0 s; choose a later one"),
+        (["--tolerance", "2"], "--tolerance 2.0: expected a number above 0 and below 1"),
         (
             ["--order", "jakobi"],
             "--order jakobi: expected gauss-seidel, jacobi or iterate; did you mean 'jacobi'?",

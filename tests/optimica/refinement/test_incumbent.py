@@ -98,7 +98,7 @@ def test_a_hook_that_raises_is_a_ctrl_c():
 
 @pytest.mark.parametrize(
     ("module", "name"),
-    [(refinement_module, "transcribe"), (refinement_module, "warm_start"), (replay_module, "_system")],
+    [(refinement_module, "transcribed_again"), (refinement_module, "warm_start"), (replay_module, "_system")],
 )
 def test_wherever_it_comes_a_solution_is_kept(monkeypatch, module, name):
     def press(*arguments):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_fmu.reading.safety import unpack
@@ -20,6 +21,7 @@ from gantrytau_fmu.systems.connected_system import (
     build_system,
     unit_of,
 )
+from gantrytau_fmu.systems.master import check_times
 from gantrytau_fmu.systems.ssp.read_ssp import FMU_TYPE, STEP, STRUCTURE
 
 SPACES = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -43,17 +45,17 @@ def write_ssp(
     an annotation. The file is complete when it appears. Raises ModelError for a system that does not fit, as
     `cosimulate`, for arrays of FMI 3, which SSP 1.0 cannot connect, and where the file cannot be written.
     """
+    begin, stop, step = (
+        number("write_ssp", name, value, unit="s")
+        for name, value in (("begin", begin), ("stop", stop), ("step", step))
+    )
+    check_times("write_ssp", begin, stop, step)
     path = Path(path)
     if path.suffix.lower() != ".ssp":
         raise ModelError(f"{path}: found the suffix '{path.suffix}', expected .ssp; call it {path.stem}.ssp")
     if path.is_dir():
         raise ModelError(
             f"{path} is a folder, expected the name of a file; name one in it, as {path / 'system.ssp'}"
-        )
-    if not begin < stop or not 0 < step <= stop - begin:
-        raise ModelError(
-            f"{path}: found begin={begin}, stop={stop}, step={step}; expected 0 < step <= stop - begin; "
-            "choose such times, in s"
         )
     files = {name: Path(file) for name, file in components.items()}
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:

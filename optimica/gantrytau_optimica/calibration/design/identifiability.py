@@ -27,9 +27,9 @@ from gantrytau_optimica.calibration.links.arm_factors import (
 )
 from gantrytau_optimica.calibration.links.arm_poses import pose_rows
 from gantrytau_optimica.calibration.links.groups import TAPE
+from gantrytau_optimica.fitting.rank import dependencies
 
 NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
-TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out
 
 
 class PoseArrays(NamedTuple):
@@ -210,29 +210,3 @@ def _of_arm(
 def deviations(noise: tuple[float, float], R: np.ndarray | None) -> np.ndarray:
     """Standard deviations of the coordinates of a measured pose, (3,) in m, or (6,) in m and rad."""
     return np.repeat(noise, 3)[: 3 if R is None else 6]
-
-
-def dependencies(directions: np.ndarray, scale: np.ndarray, names: tuple[str, ...]) -> dict[str, list[str]]:
-    """Directions (k, p), orthonormal in the scaled unknowns, as k redundant parameters with their dependent ones.
-
-    From the last parameter to the first each that takes part in some direction becomes redundant and leaves the rest,
-    until none is left: the reduced echelon form, but for pivots that are negligible.
-    """
-    left, pivots = directions, []
-    for k in reversed(range(len(names))):
-        if len(left) == 0:
-            break
-        size = np.linalg.norm(left[:, k])
-        if size > TAKES_PART:
-            pivots.append(k)
-            # a basis of what has no component k any more
-            left = np.linalg.qr(np.column_stack([left[:, k] / size, np.eye(len(left))]))[0][:, 1:].T @ left
-    pivots = sorted(pivots)
-    if not pivots:
-        return {}
-    unscaled = directions * scale
-    rows = np.linalg.lstsq(unscaled[:, pivots].T, np.eye(len(pivots)), rcond=None)[0].T @ unscaled
-    return {
-        names[pivot]: [names[k] for k in range(len(names)) if k not in pivots and abs(row[k]) > TAKES_PART]
-        for pivot, row in zip(pivots, rows, strict=True)
-    }

@@ -10,6 +10,7 @@ from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.fitting.finding import Finding, Rows
+from gantrytau_optimica.fitting.robust import robust_deviations
 
 Array = np.ndarray
 DEGREE = 3  # of the splines of the smooth part
@@ -247,12 +248,12 @@ def fitted(columns: Array, error: Array) -> tuple[Array, Array, Array]:
 def fitting(columns: Array, points: Array) -> Array:
     """Which points fit a curve through those that do, (N,)."""
     left = _left_by_most(columns, points)
-    fits = np.all(np.abs(left) <= STRAY * np.maximum(1.4826 * np.median(np.abs(left), axis=0), EXACT), axis=1)
+    fits = np.all(np.abs(left) <= STRAY * np.maximum(robust_deviations(left), EXACT), axis=1)
     if np.count_nonzero(fits) <= columns.shape[1]:
         fits = np.ones(len(points), dtype=bool)
     for _ in range(ROUNDS):  # one stray point bends the curve near it and makes its neighbours look stray
         left = points - columns @ np.linalg.lstsq(columns[fits], points[fits], rcond=None)[0]
-        usual = 1.4826 * np.median(np.abs(left[fits]), axis=0)  # 1.4826: of normal noise
+        usual = robust_deviations(left[fits])
         before, fits = fits, np.all(np.abs(left) <= STRAY * np.maximum(usual, EXACT), axis=1)
         if np.array_equal(before, fits) or np.count_nonzero(fits) <= columns.shape[1]:
             break

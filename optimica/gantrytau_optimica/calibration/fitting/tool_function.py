@@ -46,7 +46,7 @@ class ToolFunction(Record):
 
     def slopes(self, q: Array, p: Array) -> Array:
         """Derivatives by the parameters of the place, and of a turn in the world where it is asked for, (N, 3 or 6, k)."""
-        by_all = self._function.slopes(*self._arguments(q, p))[:, :, len(self.joints) :]
+        by_all = self._function.jacobian(*self._arguments(q, p))[:, :, len(self.joints) :]
         if not self.turning:
             return by_all
         R = self(q, p)[1]

@@ -16,7 +16,7 @@ from gantrytau_optimica.calibration.diagnostics.acceptance import (
     usable_rows,
 )
 from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, started
-from gantrytau_optimica.calibration.fitting.rod_fit import read_prior
+from gantrytau_optimica.calibration.fitting.priors import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
@@ -108,13 +108,8 @@ def _judged(found: NamedCalibration) -> list[Finding]:
     """Findings on a fit: outliers, convergence, undetermined numbers, size and structure of the residuals."""
     findings = [*outliers(found, found.stray_rows, "lie off by more than noise"), *not_converged(found)]
     if found.undetermined:
-        told = [
-            f"{name} follows from {', '.join(others)}"
-            if others
-            else f"nothing that was measured depends on {name}"
-            for name, others in found.dependent.items()
-        ]
-        words = f"data do not tell all numbers apart (rank {found.rank} of {len(found.names)}): {'; '.join(told)}; "
+        told = "; ".join(found.base.messages(found.names))
+        words = f"rank {found.rank} of {len(found.names)}: {told}; "
         words += f"they stay near their start values; {found.advice}"
         findings.append(Finding("undetermined", found.rows, words))
     typical = float(np.median(np.linalg.norm(found.residuals.poses(found.minimum.x)[:, :3], axis=1)))

@@ -8,6 +8,7 @@ import numpy as np
 from gantrytau.dae import Dae
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.rank import not_told_apart
 from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -106,13 +107,12 @@ def fit_findings(
     silent = found.base.silent(names)
     if silent:
         words = (
-            f"no force of this motion depends on {', '.join(silent)}, which stay as in the robot, "
-            "or as close as a body can; move them"
+            f"{not_told_apart(silent, ())}, which stay as in the robot, or as close as a body can; move them"
         )
         findings.append(Finding("silent", np.arange(0), words))
-    together = found.base.words(names)
+    together = found.base.messages(names)[bool(silent) :]
     if together:
-        words = f"only {'; '.join(together)} are determined, not the parts; what follows the first keeps its nominal value"
+        words = f"{'; '.join(together)}; what follows the first in each sum keeps its nominal value"
         findings.append(Finding("base parameters", np.arange(0), words))
     hardly = [n for n in weak if n not in silent]
     if hardly:

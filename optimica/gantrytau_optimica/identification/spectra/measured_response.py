@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
-from gantrytau.answers.linear_systems.linear_system import check_period
+from gantrytau.border.checks import number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
@@ -49,7 +49,7 @@ def measured_response(u: ArrayLike, y: ArrayLike, *, period: float, blocks: int 
     Resonances narrower than blocks / (N period) Hz are blunted. Raises ModelError for samples that are too few, or none.
     """
     place = "measured_response"
-    check_period(place, period)
+    number(place, "period", period, unit="s", above=0)
     whole = isinstance(blocks, (int, np.integer)) and not isinstance(blocks, bool)
     if not whole or blocks < 2:
         raise ModelError(

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
@@ -29,7 +30,6 @@ from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
     check_words,
     usable_poses,
 )
-from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
 from gantrytau_optimica.vision.reconstruction.stray_images import (
     in_words,

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from gantrytau.kinematics.rotations import of_vector, of_vectors
-from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.links.closure import Chain, condense
 from gantrytau_optimica.calibration.links.guideway_points import between, slope, straight
 from gantrytau_optimica.calibration.links.linear_start import linear_start
@@ -61,37 +60,6 @@ def test_the_linear_start_is_exact_without_noise(kind):
     r = true[1:4] + one.q[:, None] * true[4:7] + u
     r -= 0.0 if one.R is None else one.R @ true[7:10]
     assert linear_start(Chain(kind, 0, one.q, r, one.R)) == pytest.approx(true, abs=1e-9)
-
-
-def test_directions_that_data_do_not_hold_are_left_alone():
-    def errors(x):
-        return np.array([x[0] + x[1] - 3.0, 2 * (x[0] + x[1]) - 6.0, 1e-6 * (x[0] - x[1])])
-
-    def slopes(x):
-        return np.array([[1.0, 1.0], [2.0, 2.0], [1e-6, -1e-6]])
-
-    free = np.array([True, True])
-    truncated = gauss_newton(errors, slopes, np.array([1.0, 0.0]), free, smallest=1e-3)
-    assert truncated.x == pytest.approx([2.0, 1.0])  # the shortest way to x0 + x1 = 3
-    assert truncated.rank == 1
-    whole = gauss_newton(errors, slopes, np.array([1.0, 0.0]), free)
-    assert whole.x == pytest.approx([1.5, 1.5])
-    held = gauss_newton(errors, slopes, np.array([1.0, 0.0]), np.array([False, True]))
-    assert held.x == pytest.approx([1.0, 2.0], abs=1e-9)
-
-
-def test_steps_are_shortened_where_the_whole_overshoots():
-    # arctan: Newton from 3 diverges, as its first step leads to -9.5
-    found = gauss_newton(
-        lambda x: np.arctan(x), lambda x: np.diag(1 / (1 + x * x)), np.array([3.0]), np.array([True])
-    )
-    assert found.success
-    assert found.x[0] == pytest.approx(0.0, abs=1e-10)
-
-
-def test_errors_that_are_not_finite_end_without_success():
-    found = gauss_newton(lambda x: x * np.nan, lambda x: np.eye(1), np.array([1.0]), np.array([True]))
-    assert not found.success
 
 
 def test_between_measured_points_the_way_is_straight():
