@@ -100,17 +100,17 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--set", "q=1"], "--set q: lag.fmu has no variable 'q'; there is u, k, y."),
-        (["--set", "k.start=1"], "--set k.start: found no such variable; in an FMU it is called 'k'\n"),
+        (["--set", "q=1"], "--set: q: lag.fmu has no variable 'q'; there is u, k, y."),
+        (["--set", "k.start=1"], "--set: k.start: found no such variable; in an FMU it is called 'k'\n"),
         (
             ["--set", "y=1"],
-            "--set y is a continuous output that is calculated, expected a parameter, an input",
+            "--set: y: a continuous output that is calculated, expected a parameter, an input",
         ),
-        (["--input", "uu=1"], "--input uu: lag.fmu has no variable 'uu'; did you mean 'u'?"),
-        (["--input", "force=1"], "--input force: lag.fmu has no variable 'force'; its inputs are u."),
+        (["--input", "uu=1"], "--input: uu: lag.fmu has no variable 'uu'; did you mean 'u'?"),
+        (["--input", "force=1"], "--input: force: lag.fmu has no variable 'force'; its inputs are u."),
         (
             ["--input", "k=1"],
-            "--input k: found a parameter, expected an input that is a number; parameters are set with --set",
+            "--input: k: found a parameter, expected an input that is a number; parameters are set with --set",
         ),
         (
             ["--step", "0"],
