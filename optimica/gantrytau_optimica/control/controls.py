@@ -37,7 +37,9 @@ def _pieces(name: str, wanted: Any) -> Pieces:
         one_of(place, "controls", key, KEYS)
     kind = one_of(place, "kind", wanted.get("kind", "constant"), ("constant", "linear", "ramps"))
     if kind == "ramps" and len(wanted) > 1:
-        raise ModelError("ramps jump at every border, expected no other setting beside kind='ramps'", place=place)
+        raise ModelError(
+            "ramps jump at every border, expected no other setting beside kind='ramps'", place=place
+        )
     step = wanted.get("max_step")
     return Pieces(
         kind,
