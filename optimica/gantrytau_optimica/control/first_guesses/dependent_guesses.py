@@ -85,7 +85,7 @@ def _completed(
         return _in_closed_form(built, phase, symbols, own, span)
     found = {s.name: own.get(s.symbol.name(), guess) for s, guess in along.guesses()}
     for signal, speed in zip(moving.rates, along.speeds, strict=True):
-        found[signal.name] = own.get(signal.symbol.name(), _Derivative(speed, span[1] - span[0]))
+        found[signal.name] = own.get(signal.symbol.name(), _GuessedRate(speed, span[1] - span[0]))
     return found | {s.name: speeds[s.symbol.name()] for s in phase.states if s.symbol.name() in speeds}
 
 
@@ -181,7 +181,7 @@ def _driven(built: Built, phase: Phase, own: Mapping[str, Guess]) -> Driven:
 
 
 @dataclass(frozen=True)
-class _Derivative:
+class _GuessedRate:
     """The rate of a guess over a time of `span` seconds."""
 
     guess: Guess
@@ -232,7 +232,7 @@ class _Along:
         shares = fraction[order]
         start, stop = self.span
         rows = [start + (stop - start) * shares, *(guess(shares) for guess in self.known)]
-        rows += [_Derivative(guess, stop - start)(shares) for guess in self.speeds]
+        rows += [_GuessedRate(guess, stop - start)(shares) for guess in self.speeds]
         values = self.completion.along(self.begin, np.array(rows, dtype=float).T)
         lost = np.isnan(values).any(axis=1)
         if np.any(lost):
