@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, real, shown, vectors
+from gantrytau.kinematics.poses import mounting_axes, poses, vectors
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rods.rod_robots import RodRobot
 from gantrytau.kinematics.rotations import angle_between
@@ -54,12 +55,7 @@ class CartJoints(Record):
 
     def left(self, limit: float) -> np.ndarray:
         """What each ball joint has left of its largest angle in rad, (N, m, 2); negative beyond it."""
-        if not 0 < real(limit) <= math.pi:
-            raise ModelError(
-                f"CartJoints.left: found a limit of {limit!r}, expected an angle above 0 and up to pi in rad; convert "
-                "degrees with math.radians"
-            )
-        return real(limit) - self.ball
+        return number("CartJoints.left", "limit", limit, unit="rad", above=0.0, most=math.pi) - self.ball
 
     def inside(self, limit: float) -> np.ndarray:
         """Whether all ball joints of a pose keep that largest angle, (N,); False where there is no pose."""
@@ -161,13 +157,7 @@ def _at_home(linked: RodRobot) -> tuple[np.ndarray, np.ndarray]:
 
 def _axes(name: str, given: Any, home: np.ndarray) -> np.ndarray:
     """Mounting axes of joints as unit vectors, (m, 3)."""
-    axes = home if given is None else floats(given)
-    if axes.shape not in ((3,), home.shape) or not (np.linalg.norm(axes, axis=-1) > 0).all():
-        raise ModelError(
-            f"cart_joints: found {name} {shown(given)}, expected one direction (3,) or one per link {home.shape}, none "
-            "of them zero; give one axis for each link",
-            argument=name,
-        )
+    axes = home if given is None else mounting_axes("cart_joints", name, given, (3,), home.shape)
     return np.broadcast_to(axes / np.linalg.norm(axes, axis=-1, keepdims=True), home.shape)
 
 

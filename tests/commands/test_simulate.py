@@ -175,7 +175,7 @@ def test_without_a_display_the_window_has_a_remedy(fails, monkeypatch):
         ),
         (
             ("--input", "f=prbs(1, 0.1)"),
-            "--input f=prbs(1, 0.1): prbs: found bits=1, expected a whole number from 2",
+            "--input f=prbs(1, 0.1): prbs: found bits=1, expected a whole number of at least 2",
         ),
         (("--input", "f=no_such_file.csv:f"), "no_such_file.csv: found no file to read"),
     ],
@@ -211,7 +211,7 @@ def test_a_file_of_samples_with_a_fault(fails, robots, tmp_path, text, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--stop", "-1"), "expected start < stop"),
+        (("--stop", "-1"), "--stop -1.0: expected a number above 0 in s"),
         (("--stop", "1", "--points", "1"), "--points 1: expected a whole number of at least 2"),
         (("--stop", "1", "--tolerance", "2"), "--tolerance 2.0: expected"),
         (("--stop", "1", "--input", "x=1"), "--input: x is not an input of Pendulum (inputs: none)"),
@@ -231,7 +231,7 @@ def test_signals_take_the_seed_of_the_run(answer, fails, robots):
     assert "input f: prbs has no seed; give it one, as --seed 1, or give the run one" in fails(
         MISUSE, *arguments
     )
-    assert "--seed -3: expected a whole number from 0 on" in fails(MISUSE, *arguments, "--seed", "-3")
+    assert "--seed -3: expected a whole number" in fails(MISUSE, *arguments, "--seed", "-3")
 
 
 def test_what_the_model_does_not_have(fails):

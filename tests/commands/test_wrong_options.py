@@ -15,7 +15,7 @@ WRONG = {  # a command and an option with its value -> what is said
     (*SIMULATE, "--input", "u=3"): "--input u: Pendulum has no variable or parameter 'u'",
     (*SIMULATE, "--outputs", "x,zz"): "--outputs zz: Pendulum has no variable or parameter 'zz'",
     (*SIMULATE, "--plot", "zz", "--to", "a.png"): "--plot zz: Pendulum has no variable or parameter 'zz'",
-    (*SIMULATE, "--seed", "-1"): "--seed -1: expected a whole number from 0 on",
+    (*SIMULATE, "--seed", "-1"): "--seed -1: expected a whole number",
     (*SIMULATE, "--points", "1.5"): "'--points': expected a whole number",
     (*SIMULATE, "--tolerance", "x"): "'--tolerance': expected a number, as 0.5",
     ("view", "Pendulum", "--pose", "zz=1"): "--pose zz: Pendulum has no variable or parameter 'zz'",

@@ -39,9 +39,7 @@ def test_wrong_input_is_told_before_anything_runs(case):
 
 
 def test_a_model_needs_its_end():
-    with pytest.raises(
-        ModelError, match=r"study: found no stop=, expected the time at which simulations end, in s"
-    ):
+    with pytest.raises(ModelError, match=r"study: found no stop="):
         study(Pendulum(), over={"m": [1.0]})
 
 
@@ -55,9 +53,7 @@ def test_functions_are_checked_against_their_arguments():
         study(area, over={"width": [1]})
     with pytest.raises(ModelError, match=r"area has no argument 'seed'"):
         study(area, over={"width": [1], "height": [1]}, seeds=2)
-    with pytest.raises(
-        ModelError, match=r"found stop=1\.0 with the function area, expected it with a model only"
-    ):
+    with pytest.raises(ModelError, match=r"found stop=1\.0 with the function area"):
         study(area, over={"width": [1], "height": [1]}, stop=1.0)
     with pytest.raises(ModelError, match=r"found <class .*Pendulum.*>, expected a model, as Pendulum\(\)"):
         study(Pendulum, over={"m": [1]}, stop=1.0)

@@ -17,6 +17,7 @@ from gantrytau import (
 from gantrytau.mechanics import gears, rotational, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import FourBar, GantryTau, prototypes
+from tests.mechanisms.rows import row
 from tests.references.sticking import Chain, M, Plank, shaken
 from tests.simulation.test_sticking_motions import NEAR, TOLERANCE, lawful
 
@@ -98,10 +99,7 @@ def test_a_geared_shaft_sticks_on_the_side_of_the_slide():
         rail = StickSlipFriction(f_c=100.0, f_s=150.0)
 
         def equations(self):
-            yield connect(self.motor.flange, self.rotor.flange_a)
-            yield connect(self.rotor.flange_b, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.slide.flange)
-            yield connect(self.slide.flange, self.rail.flange)
+            yield from row(self.motor, self.rotor, self.screw, self.slide, self.rail)
 
     lead = 0.01 / (2 * np.pi)
     run = simulate(Geared(), stop=1.0, tolerance=TOLERANCE, inputs={"motor.tau": ([0.0, 1.0], [0.0, 0.5])})

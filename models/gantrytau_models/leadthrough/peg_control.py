@@ -1,13 +1,16 @@
 """The control of a tool that is led by hand while it is in a hole, (8.2) to (8.11) of Dressler (2012)."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, if_else, norm_2, sampled
+from gantrytau import Input, Model, Output, Parameter, Real, if_else, norm_2, sampled
+from gantrytau.border.checks import check_words
 from gantrytau_models.leadthrough.laws import Impedance, NormalEstimate, Projection, ToolForceControl
 
 GATES = {"force": float(np.pi), "gated": float(np.radians(10.0))}  # rad, by the name of the normal
+
+Normal = Literal["force", "gated"]
 
 
 class PegControl(Model):
@@ -38,9 +41,8 @@ class PegControl(Model):
     v = Output(3, unit="m/s", start=0.0, description="velocity for the servos, from sample to sample")
     w = Output(3, unit="rad/s", start=0.0, description="angular velocity for the servos")
 
-    def __init__(self, normal: str = "force", **modifications: Any):
-        if normal not in GATES:
-            raise ModelError(f"PegControl: found normal={normal!r}, expected 'force' or 'gated'")
+    def __init__(self, normal: Normal = "force", **modifications: Any):
+        check_words(PegControl.__init__, locals(), "PegControl")
         super().__init__(dict(normal=dict(gate=GATES[normal])), **modifications)
 
     def equations(self):

@@ -18,7 +18,7 @@ from gantrytau.mechanics.multibody.orientation import of_quaternion
 from gantrytau.mechanics.rotational import Torque
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
-from gantrytau_models.mechanisms.gantry_tau import Cart, WrongRecord, driven_carts, in_words
+from gantrytau_models.mechanisms.gantry_tau import Cart, check_record, driven_carts
 from gantrytau_models.mechanisms.six_link import Plate, quaternion
 from gantrytau_models.prototypes import RotatingArm, RotatingPrototype
 
@@ -160,10 +160,7 @@ class F1GantryTau(Model):
 
 
 def _check_prototype(prototype: RotatingPrototype, robot: str) -> None:
-    if not isinstance(prototype, RotatingPrototype):
-        raise WrongRecord(
-            f"{robot}: found {in_words(prototype)}, expected a record with turntables such as prototypes.F1"
-        )
+    check_record(prototype, robot, RotatingPrototype)
     found = tuple((len(arm.turntables), len(arm.links)) for arm in prototype.arms)
     if found != STRUCTURE:
         raise ModelError(

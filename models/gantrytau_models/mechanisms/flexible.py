@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Array, Model, Parameter, Real, connect, der, dot, norm_2, outer, require
+from gantrytau.border.checks import array
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.self_description.appearance import Ball, ForceArrow, Slideway, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
 from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction
-from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, WrongRecord, driven_carts, in_words
+from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, check_record, driven_carts
 from gantrytau_models.prototypes import FlexiblePrototype, Prototype
 
 
@@ -155,13 +156,9 @@ class FlexibleGantryTau(Model):
         friction: type[Friction] | None = TanhFriction,
         **modifications: Any,
     ):
-        if not isinstance(prototype, FlexiblePrototype):
-            raise WrongRecord(
-                f"{type(self).__name__}: found {in_words(prototype)}, expected a record with stiffness such as "
-                "prototypes.L1_flexible"
-            )
+        check_record(prototype, type(self).__name__, FlexiblePrototype)
         carts = driven_carts(prototype, friction, type(self).__name__)
-        start = np.asarray(r, dtype=float)
+        start = array("FlexibleGantryTau", "r", r, (3,), unit="m")
         positions = unstretched(prototype, start)
         defaults = dict(
             plate_mass=prototype.plate_mass,
@@ -202,8 +199,7 @@ def unstretched(prototype: Prototype, r: np.ndarray) -> np.ndarray:
 
     Raises ModelError for a tool that a link does not reach.
     """
-    if r.shape != (3,) or not np.all(np.isfinite(r)):
-        raise ModelError(f"FlexibleGantryTau: found r={r.tolist()}, expected three finite numbers in m")
+    r = array("FlexibleGantryTau", "r", r, (3,), unit="m")
     positions = []
     for i, arm in enumerate(prototype.arms):
         away, along = r - np.array(arm.offset), np.array(arm.direction)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.refusal import ModelError, short
 from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Slideway
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (
@@ -22,7 +22,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.translational import Flange, Force, Friction, Frictionless, TanhFriction
-from gantrytau_models.prototypes import Prototype, RotatingPrototype
+from gantrytau_models.prototypes import FlexiblePrototype, Prototype, RotatingPrototype
 
 
 class Arm(Model):
@@ -173,13 +173,31 @@ class WrongRecord(ModelError, TypeError):
     """What a robot was given is no record that describes it, or no class of friction."""
 
 
-def in_words(found: Any) -> str:
-    """A record, or what was given in place of one, by its name: whole it is a page long."""
-    return f"{type(found).__name__}(name={found.name!r})" if hasattr(found, "name") else repr(found)
-
-
 def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Friction:
     return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
+
+
+# a record of each kind that robots are made of
+EXAMPLES = {
+    Prototype: "prototypes.L1",
+    RotatingPrototype: "prototypes.F1",
+    FlexiblePrototype: "prototypes.L1_flexible",
+}
+
+
+def check_record(prototype: Any, robot: str, kind: type = Prototype) -> None:
+    """ModelError for what does not describe a robot of that kind."""
+    if not isinstance(prototype, kind):
+        found = (
+            f"{type(prototype).__name__}(name={prototype.name!r})"
+            if hasattr(prototype, "name")
+            else short(prototype)
+        )
+        raise WrongRecord(
+            f"found {found}, expected a {kind.__name__} such as {EXAMPLES[kind]}; from gantrytau_models import prototypes",
+            place=robot,
+            argument="prototype",
+        )
 
 
 def driven_carts(
@@ -189,11 +207,7 @@ def driven_carts(
     record: type = Prototype,
 ) -> list[dict]:
     """Modifications of the carts of a robot; ModelError for what is no such record or no friction."""
-    if not isinstance(prototype, record):
-        raise WrongRecord(
-            f"{robot}: found {in_words(prototype)}, expected a prototype record such as prototypes.L1, "
-            "of `from gantrytau_models import prototypes`"
-        )
+    check_record(prototype, robot, record)
     if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
         raise WrongRecord(
             f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"

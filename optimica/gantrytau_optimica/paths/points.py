@@ -18,7 +18,9 @@ def checked_points(name: str, points: Any, fewest: int = 2, why: str = "") -> Ar
     """Points as an array (n, 3) or (n, 2). ModelError for another shape, too few, or what is not finite."""
     found = array(name, "points", points, (None, 3), (None, 2), unit="m")
     if len(found) < fewest:
-        raise ModelError(f"found {len(found)} points, expected at least {fewest}{why}", place=name, argument="points")
+        raise ModelError(
+            f"found {len(found)} points, expected at least {fewest}{why}", place=name, argument="points"
+        )
     return found
 
 

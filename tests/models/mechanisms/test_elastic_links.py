@@ -78,7 +78,5 @@ def test_plate_that_does_not_turn_has_three_modes(joint, tube, expected):
 
 
 def test_place_out_of_reach_is_refused():
-    with pytest.raises(
-        InitializationError, match=r"SixLinkGantryTau: no consistent start.*is a length out of reach"
-    ):
+    with pytest.raises(InitializationError, match=r"SixLinkGantryTau: no consistent start.*is a length out"):
         ElasticSixLinkGantryTau(RECORD, r=(0.9, 9.0, -0.4))

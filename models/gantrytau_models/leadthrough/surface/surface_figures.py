@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,6 +50,7 @@ def plot_oscillation(
     """
     from matplotlib.figure import Figure
 
+    number("plot_oscillation", "begin", begin, unit="s")
     _refuse_none(runs, "plot_oscillation")
     figure = Figure(figsize=(9, 4), layout="constrained")
     force, spectrum = figure.subplots(1, 2)
