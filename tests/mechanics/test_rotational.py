@@ -56,8 +56,7 @@ def test_coulomb_friction_slows_evenly_and_viscous_friction_in_proportion():
 
 
 @pytest.mark.parametrize(
-    ("law", "at_w_s"),
-    [(rotational.TanhFriction, np.tanh(1.0)), (rotational.LinearFriction, 1.0)],
+    ("law", "at_w_s"), [(rotational.TanhFriction, np.tanh(1.0)), (rotational.LinearFriction, 1.0)]
 )
 def test_friction_opposes_the_speed_on_both_sides(law, at_w_s):
     dae = translate(Slowed(friction=law(tau_c=4.0, tau_v=5.0, w_s=0.1)))

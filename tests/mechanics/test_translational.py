@@ -70,8 +70,7 @@ def test_coulomb_friction_slows_evenly_and_viscous_friction_in_proportion():
 
 
 @pytest.mark.parametrize(
-    ("law", "at_v_s"),
-    [(translational.TanhFriction, np.tanh(1.0)), (translational.LinearFriction, 1.0)],
+    ("law", "at_v_s"), [(translational.TanhFriction, np.tanh(1.0)), (translational.LinearFriction, 1.0)]
 )
 def test_friction_opposes_the_speed_on_both_sides(law, at_v_s):
     dae = translate(Slowed(friction=law(f_c=4.0, f_v=5.0, v_s=0.1)))
