@@ -26,7 +26,7 @@ EXAMPLES = {"m": "mm", "rad": "deg", "s": "ms", "m/s": "mm/s"}
 class Value:
     """What a key holds: a number, vector or table of numbers in a unit, a whole number or a text.
 
-    unit: of WORDS, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere;
+    unit: of WORDS, several separated by commas, or "whole", "text", or "table", one or several, which are read elsewhere;
     shapes: those allowed, None for any number of rows; least: the smallest number allowed, or above: what it must exceed;
     words: of which a text must be one.
     """
@@ -41,11 +41,20 @@ class Value:
         """The value in SI, lists as lists; ModelError for anything else."""
         if self.unit == "text":
             return self._text(place, found)
-        if self.unit == "bodies":
-            return found
+        if self.unit == "table":
+            return self._tables(place, found)
         if not any(_has(found, shape) for shape in self.shapes):
             raise ModelError(f"{place}: found {_short(found)}, expected {self.expected()}")
         return self._numbers(place, found)
+
+    def _tables(self, place: str, found: Any) -> Any:
+        several = self.shapes != ((),)
+        tables = found if several and isinstance(found, list) else [found]
+        if all(isinstance(one, Mapping) for one in tables) and several == isinstance(found, list):
+            return found
+        name = place.rpartition(": ")[2]
+        expected = f"a table for each, [[{name}]]" if several else f"a table, [{name}]"
+        raise ModelError(f"{place}: found {_short(found)}, expected {expected}")
 
     def _text(self, place: str, found: Any) -> str:
         if not isinstance(found, str) or not found.strip():
@@ -100,6 +109,8 @@ class Value:
         """What it must be, in words."""
         if self.unit == "text":
             return "a text in quotes" + (f": {', '.join(self.words)}" if self.words else "")
+        if self.unit == "table":
+            return "a table"
         shapes = [_in_words(shape) for shape in self.shapes]
         return f"{' or '.join(shapes)}{self._unit() if shapes == [''] else f', each {self._unit()}'}"
 

@@ -8,7 +8,7 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.compiler.blocks.inverse_form import Inverse, SortedEquations, inverse_of, torn_of
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block
@@ -93,11 +93,11 @@ def assemble(
             left.enter(one)
     if causality == "inverse" and not left.inverse:
         why = f" ({'; '.join(left.forward)})" if left.forward else ""
-        raise ModelError(
-            f"{dae.name}: causality='inverse', but nothing has an inverse form here{why}, expected as many inputs that "
-            "drive a mechanism as it has accelerations of states; leave causality out",
-            argument="causality",
+        words = (
+            f"but nothing has an inverse form here{why}, expected as many inputs that drive a mechanism as it has "
+            "accelerations of states; leave it out"
         )
+        raise ModelError(words, place=dae.name, found=Given("causality", causality))
     algebraics = left.algebraics
     draft = System(
         dae=dae,

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gantrytau.border.checks import instance
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.border.units import Scale, known_scale, scale
 from gantrytau.results.series import Series, split_element
@@ -42,11 +43,7 @@ def shown_units(
     place = f"{result.title or 'Result'}: {verb}: display"
     if display is None:
         display = default
-    if not isinstance(display, (str, Mapping)):
-        raise ModelError(
-            f"{place}: found {display!r}, expected a unit, or units by names, {{'phi': 'deg'}}",
-            argument="display",
-        )
+    instance(place.removesuffix(": display"), "display", display, (str, Mapping), "a unit, or {name: unit}")
     base = display if display in (SI, DECLARED) else default
     chosen = {name: result.display(name) for name in names} if base == DECLARED else {}
     try:

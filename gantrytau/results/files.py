@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean
+from gantrytau.border.refusal import GantryTauError, Given, ModelError, did_you_mean
 from gantrytau.results.display_units import SI, Display, Shown, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
@@ -33,11 +33,8 @@ def save(result: Series, path: str | os.PathLike[str], display: Display = None) 
             _write_csv(result, partial, shown)
         return path
     if display not in (None, SI):
-        raise ModelError(
-            f"{path}: save: found display={display!r}, expected none: '{path.suffix}' holds SI, and the units beside the "
-            "numbers; leave it out, or save a .csv",
-            argument="display",
-        )
+        words = f"expected none: '{path.suffix}' holds SI, and the units beside the numbers; leave it out, or save a .csv"
+        raise ModelError(words, place=f"{path}: save", found=Given("display", display))
     with replacing(path) as partial:
         writer(result, partial)
     return path

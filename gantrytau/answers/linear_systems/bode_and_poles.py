@@ -135,10 +135,8 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
         check_suffix(file)
     rows, columns = len(system.outputs), len(system.inputs)
     if not 0 < rows * columns <= MOST:
-        raise ModelError(
-            f"{system.title}: plot_bode found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name "
-            "fewer in inputs= and outputs="
-        )
+        words = f"found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name fewer in "
+        raise ModelError(words, Given("inputs"), " and ", Given("outputs"), place=f"{system.title}.plot_bode")
     figure, axes = plt.subplots(
         2 * rows,
         columns,

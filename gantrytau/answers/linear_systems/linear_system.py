@@ -96,10 +96,8 @@ class LinearSystem(Record):
         period: s. ModelError for a system that is discrete already, or a period that is none.
         """
         if self.period is not None:
-            raise ModelError(
-                f"{self.title}: found a discrete system with a period of {self.period:g} s, expected a continuous one; "
-                "take it as it is, or linearize with another period="
-            )
+            words = f"found a discrete system with a period of {self.period:g} s, expected a continuous one; take it as it "
+            raise ModelError(words, "is, or linearize with another ", Given("period"), place=self.title)
         period = number(self.title, "period", period, unit="s", above=0)
         return _Plain(self, *held(self.A, self.B, period), period)
 

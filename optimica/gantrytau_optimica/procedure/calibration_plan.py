@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import Model, ModelError, Result
+from gantrytau.border.checks import number
 from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
@@ -56,13 +57,10 @@ class CalibrationPlan(PosePlan):
                 f"motion: found a plan of {self.robot_name} that was loaded without it, expected its robot; "
                 "load_plan(folder, robot, limits)"
             )
-        for name, value, least in (("speed", speed, 1e-3), ("rest", rest, 0.0)):
-            if not (isinstance(value, (int, float)) and least <= value < np.inf):
-                raise ModelError(
-                    f"motion.{name}: found {value!r}, expected a number from {least:g}", argument=name
-                )
+        number("motion", "speed", speed, least=1e-3)
+        number("motion", "rest", rest, least=0.0)
         fleet = self.cell.fleet.with_limits(self.cell.limits)
-        return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, float(speed), float(rest))
+        return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, speed, rest)
 
     def write(self, folder: str | Path, **program: Any) -> Path:
         """Write workspace.png, poses.csv, measurements-template.csv, plan.json, plan.html and the program into a folder.

@@ -4,11 +4,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import check_words
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
@@ -157,10 +159,7 @@ def measured_plan(
     that the plan expects; positions that fit it in no frame stay as they are. Raises ModelError where actuators are not
     those of planned poses, positions are mirrored, those of the plan itself, or not in the base where they are said to be.
     """
-    if frame not in (None, *get_args(Frame)):
-        raise ModelError(
-            f"measured_plan: found frame={frame!r}, expected 'fitted' or 'base'", argument="frame"
-        )
+    check_words(measured_plan, locals())
     chosen: Frame = frame or planned.cell.frame
     data = measurements.select(np.flatnonzero(~np.isnan(measurements.r).all(axis=1)))
     plan, rows = planned.plan, _rows(planned, data)
@@ -178,7 +177,11 @@ def measured_plan(
     if chosen == "base":
         raise ModelError(
             f"found positions {min(as_tool, as_target):.3g} m off the poses of the plan beside it in the median, expected "
-            f"{near:.3g} m at most where frame='base'; take frame='fitted' for another frame",
+            f"{near:.3g} m at most where ",
+            Given("frame", "base"),
+            "; take ",
+            Given("frame", "fitted"),
+            " for another frame",
             argument="frame",
         )
     placed = plan.placed(data)
@@ -230,10 +233,10 @@ def _rows(planned: PlannedCell, data: Measurements) -> np.ndarray:
     if np.count_nonzero(rows[good] >= 0) >= min(FEW, np.count_nonzero(good)):
         return rows
     words = next((words for words, other in _mistakes(q) if np.mean(matched(other, expected) >= 0) > 0.5), "")
-    remedy = words or "q1, q2, ... must be those of poses.csv"
     raise ModelError(
-        f"found no actuator positions of the plan beside it; {remedy}; for measurements of other poses name the robot, "
-        f"robot='{planned.cell.name}'"
+        f"found no actuator positions of the plan beside it; {words or 'q1, q2, ... must be those of poses.csv'}; for "
+        "measurements of other poses name the robot, ",
+        Given("robot", planned.cell.name),
     )
 
 

@@ -69,9 +69,9 @@ def test_the_example_is_printed(run, fails):
         (dict(carts='carts = "axes"'), 'program.carts: found "axes"; there is robax, extax.'),
         (dict(error='errors = "1 mm"'), "goal.errors: there is no such key; did you mean 'error'?"),
         (dict(home='limit = "x"'), "plan.limit: there is no such key"),
-        (dict(name='name = "1Cal"'), "program.name: found '1Cal', expected a name of RAPID"),
-        (dict(trigger='trigger = "do measure"'), "program.trigger: found 'do measure', expected a name of"),
-        (dict(tool='tool = "module"'), "program.tool: found 'module', expected a name of RAPID"),
+        (dict(name='name = "1Cal"'), "program: found name='1Cal', expected a name of RAPID"),
+        (dict(trigger='trigger = "do measure"'), "program: found trigger='do measure', expected a name of"),
+        (dict(tool='tool = "module"'), "program: found tool='module', expected a name of RAPID"),
     ],
 )
 def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
@@ -86,7 +86,7 @@ def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("[goal]", "[goals]", "[goals]: there is no such table; did you mean 'goal'?"),
+        ("[goal]", "[goals]", "goals: there is no such key; did you mean 'goal'?"),
         ("[robot]", "[[robot]]", "robot: found"),
         ("[device]", "[[device]]", "device: found"),
         ("[[limits.plate]]", "[limits.plate]", "limits.plate: found"),
@@ -107,9 +107,7 @@ def test_tables_that_cannot_be_read(fails, tmp_path, old, new, words):
 def test_a_table_that_is_missing(fails, tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text('[robot]\nmodel = "GantryTau(L1)"\ntape = 0.005\n')
-    assert "found no table [goal], expected one; `gantrytau calibrate --example`" in fails(
-        MISUSE, "calibrate", file
-    )
+    assert "goal: found nothing, expected a table" in fails(MISUSE, "calibrate", file)
     assert "there is no such file" in fails(MISUSE, "calibrate", tmp_path / "nowhere.toml")
 
 

@@ -291,8 +291,8 @@ def test_a_fault_that_only_running_shows(path, fault, messages):
 
 
 def test_a_library_that_hangs_is_stopped(path):
-    (line,) = told(running3(path, "HANG"), run=True, timeout=3.0)
-    assert re.fullmatch(r"error: .*: no answer after 3 s", line)
+    (line,) = told(running3(path, "HANG"), run=True, timeout=2.0)
+    assert re.fullmatch(r"error: .*: no answer after 2 s", line)
 
 
 def test_a_binary_that_cannot_be_loaded(path):

@@ -59,24 +59,12 @@ NO_PHASE: Any = 3
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
-        (
-            changed(out=Nested()),
-            "Wrong: the phase out.inner lies inside of out, expected phases as components",
-        ),
-        (
-            changed(held=Held()),
-            "Wrong: the phase held.inner lies inside of held, expected phases as components",
-        ),
+        (changed(out=Nested()), "Wrong: the phase out.inner lies inside of out, expected phases as"),
+        (changed(held=Held()), "Wrong: the phase held.inner lies inside of held, expected phases as"),
         (Outside, "Outside: load belongs to no phase, expected variables in phases only; declare it in one"),
         (Chosen, "Chosen: hand belongs to no phase"),
-        (
-            changed(integrand=lambda self: self.out.mass.u**2),
-            "Wrong.integrand: found an integrand beside phases, expected none; write it in the phases",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.y"])]),
-            "back.mass.y",
-        ),
+        (changed(integrand=lambda self: self.out.mass.u**2), "Wrong.integrand: found an integrand beside"),
+        (changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.y"])]), "back.mass.y"),
         (
             changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.u"])]),
             "Wrong: link, jump: back.mass.u is no state of the phase, expected one of back.mass.x, back.mass.v",
@@ -85,26 +73,14 @@ NO_PHASE: Any = 3
             changed(constraints=lambda self: [link(self.out, self.back, jump="mass.v")]),
             "link: found jump='mass.v', expected a list of names; write ['mass.v']",
         ),
-        (
-            changed(constraints=lambda self: [link(self.out.mass, self.back)]),
-            "expected two phases: components that are Optimizations",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, NO_PHASE)]),
-            "link: found 3, expected two phases",
-        ),
-        (
-            changed(constraints=lambda self: [self.out.mass.x <= self.back.mass.x]),
-            "joins signals of several phases over their whole paths, expected values at one time",
-        ),
+        (changed(constraints=lambda self: [link(self.out.mass, self.back)]), "expected two phases:"),
+        (changed(constraints=lambda self: [link(self.out, NO_PHASE)]), "link: found 3, expected two phases"),
+        (changed(constraints=lambda self: [self.out.mass.x <= self.back.mass.x]), "joins signals of"),
         (
             changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.x) == 0]),
             "joins out and back, expected variables of one phase",
         ),
-        (
-            changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]),
-            "link(out, back) finds no out.mass.h, expected the same variables in both phases",
-        ),
+        (changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]), "link(out, back)"),
         (
             changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.z) == 0]),
             "Mass has no 'z'",

@@ -54,7 +54,9 @@ def check_folder(what: str, folder: Path) -> None:
     if not folder.is_dir() and (folder.exists() or not folder.absolute().parent.is_dir()):
         found = "a file" if folder.exists() else f"no folder '{folder.absolute().parent}' to make it in"
         raise ModelError(
-            f"{what}: found {found} for '{folder}', expected a folder; create it, or name another one"
+            f"found {found} for '{folder}', expected a folder; create it, or name another one",
+            place=what,
+            argument="folder",
         )
 
 
@@ -133,10 +135,8 @@ def plan_on_file(path: Path) -> dict[str, Any]:
             f"load_plan: found no plan at '{path}' ({error.strerror}), expected plan.json as "
             "CalibrationPlan.write leaves it; name its folder, or plan first"
         ) from None
-    except ValueError as error:
-        raise ModelError(
-            f"load_plan: found '{path}' that is no JSON ({error}), expected a plan; write it anew"
-        ) from None
+    except ValueError:
+        numbers = None
     if not isinstance(numbers, dict) or numbers.get("kind") != KIND:
         raise ModelError(f"load_plan: found '{path}' that is no calibration plan, expected one; plan again")
     if numbers.get("format") != FORMAT:
@@ -146,14 +146,9 @@ def plan_on_file(path: Path) -> dict[str, Any]:
         )
     try:
         return _fields(numbers)
-    except KeyError as error:
-        raise ModelError(
-            f"load_plan: found '{path}' without {error.args[0]!r}, expected a whole plan; plan again"
-        ) from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise ModelError(
-            f"load_plan: found '{path}' with something else than a plan has ({error}), expected a whole plan; plan again"
-        ) from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        lacks = f"without {error}" if isinstance(error, KeyError) else f"with what no plan has ({error})"
+        raise ModelError(f"load_plan: found '{path}' {lacks}, expected a whole plan; plan again") from None
 
 
 def _fields(numbers: dict[str, Any]) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from typing import Literal
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import check_words, number
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
@@ -70,40 +72,27 @@ def check_program(
     speed: float = 0.1,
     settle: float = 1.0,
     measure: float = 2.0,
-    carts: str = "robax",
+    carts: Literal["robax", "extax"] = "robax",
     trigger: str = OPERATOR,
     tool: str = "tool0",
 ) -> None:
     """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
-    if carts not in ("robax", "extax"):
-        raise ModelError(
-            f"program.carts: found {carts!r}, expected 'robax' or 'extax', the axes of a joint target that move",
-            argument="carts",
-        )
-    names = [
-        ("name", name),
-        ("tool", tool),
-        *([] if trigger in (OPERATOR, WORDS) else [("trigger", trigger)]),
-    ]
-    for what, word in names:
-        _check_name(what, word)
-    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
-        if not (np.isfinite(value) and value >= least):
-            unit = "m/s above 0" if what == "speed" else "s, not negative"
-            raise ModelError(f"program.{what}: found {value!r}, expected a number in {unit}", argument=what)
+    check_words(check_program, locals(), "program")
+    number("program", "speed", speed, least=1e-3)
+    number("program", "settle", settle, least=0.0)
+    number("program", "measure", measure, least=0.0)
+    names = {"name": name, "tool": tool} | ({} if trigger in (OPERATOR, WORDS) else {"trigger": trigger})
+    for what, word in names.items():
+        if not NAME.fullmatch(word) or word.lower() in RESERVED:
+            raise ModelError(
+                "expected a name of RAPID: a letter, then letters, digits and _, 32 characters at most, no reserved word",
+                place="program",
+                found=Given(what, word),
+            )
 
 
 def _procedure(name: str) -> str:
     return f"Run{name}"[:32]
-
-
-def _check_name(what: str, word: str) -> None:
-    if not NAME.fullmatch(word) or word.lower() in RESERVED:
-        raise ModelError(
-            f"program.{what}: found {word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
-            "characters at most, no reserved word",
-            argument=what,
-        )
 
 
 def _label(plan: PosePlan, row: int) -> str:

@@ -119,5 +119,6 @@ def test_what_is_no_constraint(data, constraints, error, words):
 
 
 def test_gauss_newton_keeps_no_constraints(data):
-    with pytest.raises(ModelError, match="take method='ipopt'"):
+    with pytest.raises(ModelError, match="method='ipopt'") as refusal:
         calibrate(GantryTau(prototypes.L1), data, constraints={"|arms[0].direction|": 1.0})
+    assert refusal.value.argument == "constraints"
