@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Phase
-from gantrytau_optimica.transcription.program import Program, Rows
+from gantrytau_optimica.transcription.program import Program, RowGroup
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
 MEANING = {
@@ -65,7 +65,7 @@ class Meanings:
                 found[constraint.name] = found[value.name()]
         return {name: "" if unit == "1" else unit for name, unit in found.items()}
 
-    def group(self, group: Rows, which: int) -> Meaning:
+    def group(self, group: RowGroup, which: int) -> Meaning:
         """The row `which` of a group."""
         moment = group.moments[which]
         time = None if np.isnan(moment) else float(self.phases[group.phase].times(moment))

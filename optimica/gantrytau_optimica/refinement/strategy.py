@@ -60,9 +60,7 @@ class FirstGuess:
     @cached_property
     def following(self) -> Ends:
         """Conditions at the end that follow from others there."""
-        return (
-            following_ends(self.built) if self.program.places.layouts[0].scheme.scheme != "shooting" else []
-        )
+        return following_ends(self.built) if self.program.scheme.refinable else []
 
 
 @dataclass(frozen=True)

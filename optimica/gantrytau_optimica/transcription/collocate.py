@@ -29,7 +29,7 @@ from gantrytau_optimica.transcription.costs import differences, running_costs, s
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_term
-from gantrytau_optimica.transcription.program import Program, Rows, boundary_part, row_limits
+from gantrytau_optimica.transcription.program import Program, RowGroup, boundary_part, row_limits
 from gantrytau_optimica.transcription.scheme import Collocation
 
 
@@ -46,7 +46,7 @@ def collocate(
     places = lay_out(problem, tuple(meshes), scheme)
     free, borders = located or (np.array([n.guess for n in problem.free]), [m.borders for m in meshes])
     where = places_of_points(places, free, borders, inside_only=located is None)
-    groups: list[Rows] = []
+    groups: list[RowGroup] = []
     parts: list[tuple[PhaseRows, Layout, list[Limit]]] = []
     count = 0
     for number, layout in enumerate(places.layouts):
@@ -79,7 +79,7 @@ class PhaseRows:
 
     start: int
     stop: int
-    groups: list[Rows]
+    groups: list[RowGroup]
     linear: list[Sparse]
     begin: int  # of the equations of algebraics at the start
 
@@ -93,13 +93,13 @@ def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], s
     for i, state in enumerate(phase.states if jumps.shape[0] else ()):
         rows = stop + nx * np.arange(layout.mesh.elements) + i
         borders = layout.mesh.borders[1:]
-        groups.append(Rows("continuity", state.name, number, rows, borders, 0.0, 0.0, state.nominal))
+        groups.append(RowGroup("continuity", state.name, number, rows, borders, 0.0, 0.0, state.nominal))
     linear.append(jumps)
     begin = stop = stop + jumps.shape[0]
     for name, size in zip(phase.residual_names, phase.residual_sizes, strict=True):
         if not layout.begin.size:
             break
-        groups.append(Rows("algebraic", name, number, np.array([stop]), np.zeros(1), 0.0, 0.0, size))
+        groups.append(RowGroup("algebraic", name, number, np.array([stop]), np.zeros(1), 0.0, 0.0, size))
         stop += 1
     linear.append(sparse.csr_matrix((stop - begin, places.size)))
     for signal, chain in layout.chains.items():
@@ -108,7 +108,9 @@ def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], s
             continue
         linear.append(differences(places, chain))
         rows, moments = stop + np.arange(chain.size - 1), layout.moment[chain[1:] - layout.first]
-        groups.append(Rows("step", name, number, rows, moments, -step, step, phase.signals[signal].nominal))
+        groups.append(
+            RowGroup("step", name, number, rows, moments, -step, step, phase.signals[signal].nominal)
+        )
         stop += rows.size
     if layout.knots.size:
         lengths, matrix = _rows_of_stretches(places, layout, number, stop)
@@ -120,7 +122,7 @@ def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], s
 
 def _rows_at_points(
     places: Places, layout: Layout, number: int, path: list[Limit], start: int
-) -> tuple[list[Rows], Sparse]:
+) -> tuple[list[RowGroup], Sparse]:
     """Dynamics, algebraic equations and path limits at every point; D x of the dynamics, their linear part."""
     phase, fractions = layout.phase, layout.fractions
     meaning = [("dynamics", s.name, 0.0, 0.0, s.nominal) for s in phase.states]
@@ -130,7 +132,7 @@ def _rows_at_points(
     per_point, points = len(meaning), fractions.size
     at_points = start + per_point * np.arange(points)
     groups = [
-        Rows(kind, name, number, at_points + i, fractions, low, high, size)
+        RowGroup(kind, name, number, at_points + i, fractions, low, high, size)
         for i, (kind, name, low, high, size) in enumerate(meaning)
     ]
     # row (element, point, state) of the dynamics: D x - h f = 0, here D x, in _point_term - h f
@@ -140,7 +142,9 @@ def _rows_at_points(
     return groups, sparse.csr_matrix((D_x.data, (row, D_x.col)), shape=(per_point * points, places.size))
 
 
-def _rows_of_stretches(places: Places, layout: Layout, number: int, start: int) -> tuple[list[Rows], Sparse]:
+def _rows_of_stretches(
+    places: Places, layout: Layout, number: int, start: int
+) -> tuple[list[RowGroup], Sparse]:
     """Distances of consecutive moving borders, the ends of the phase included: least lengths and linear part."""
     m = layout.knots.size
     rows = np.arange(m)
@@ -150,7 +154,7 @@ def _rows_of_stretches(places: Places, layout: Layout, number: int, start: int) 
     for i, length in enumerate(lengths):
         name = f"the length of stretch {i + 1} of the mesh"
         low = layout.mesh.shortest * length - float(i == m)
-        found.append(Rows("border", name, number, np.array([start + i]), np.array([np.nan]), low, np.inf))
+        found.append(RowGroup("border", name, number, np.array([start + i]), np.array([np.nan]), low, np.inf))
     return found, matrix
 
 

@@ -20,7 +20,7 @@ CLOSE = 1e-2  # of its margin: what is closer rests on it
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class RowGroup:
     """Rows of the program that mean one thing: kind, name in the model's words, phase, and places on [0, 1] (or NaN).
 
     size: a row of the program times this is the quantity in its unit.
@@ -43,7 +43,7 @@ class Program:
     problem: ControlProblem
     places: Places
     assembled: Assembled
-    groups: tuple[Rows, ...]
+    groups: tuple[RowGroup, ...]
     lbw: np.ndarray
     ubw: np.ndarray
     lbg: np.ndarray
@@ -134,13 +134,13 @@ def first_guess(program: Program) -> np.ndarray:
     return np.clip(w, program.lbw * places.scale, program.ubw * places.scale)
 
 
-def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[list[Rows], list[Term]]:
+def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[list[RowGroup], list[Term]]:
     """The conditions on values at single times, the last rows of every program, from row `start` on."""
     boundary = places.problem.boundary
     rows = start + np.arange(len(boundary))
     never = np.array([np.nan])
     groups = [
-        Rows("boundary", limit.name, -1, np.array([row]), never, limit.lower, limit.upper, limit.size)
+        RowGroup("boundary", limit.name, -1, np.array([row]), never, limit.lower, limit.upper, limit.size)
         for row, limit in zip(rows, boundary, strict=True)
     ]
     if not boundary:
@@ -151,7 +151,7 @@ def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[l
     return groups, [single_term(places, where, [limit.expression for limit in boundary], scatter)]
 
 
-def row_limits(groups: Sequence[Rows], total: int) -> tuple[np.ndarray, np.ndarray]:
+def row_limits(groups: Sequence[RowGroup], total: int) -> tuple[np.ndarray, np.ndarray]:
     """Limits of all rows."""
     lower, upper = np.zeros(total), np.zeros(total)
     for group in groups:

@@ -35,7 +35,7 @@ from gantrytau_optimica.transcription.costs import running_costs, sample_sums, w
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import places_of_points, running, single_term
-from gantrytau_optimica.transcription.program import Program, Rows, boundary_part, row_limits
+from gantrytau_optimica.transcription.program import Program, RowGroup, boundary_part, row_limits
 from gantrytau_optimica.transcription.scheme import Collocation
 
 PLACES = np.array([0.0, 0.5, 0.5, 1.0])
@@ -145,7 +145,7 @@ def shoot(
     if moving is not None:
         where = f"at({moving.point.time}, ...): this share of the horizon changes with free numbers; take "
         raise ModelError(where, Given("scheme", "radau"), place=problem.name, argument="scheme")
-    groups: list[Rows] = []
+    groups: list[RowGroup] = []
     linear: list[Sparse] = []
     parts: list[tuple[ShootingLayout, list[Limit], int, int]] = []
     count = 0
@@ -224,11 +224,12 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Shooting, first: int) -> Shooting
     )  # fmt: skip
 
 
-def _path_groups(layout: ShootingLayout, number: int, path: list[Limit], start: int) -> list[Rows]:
+def _path_groups(layout: ShootingLayout, number: int, path: list[Limit], start: int) -> list[RowGroup]:
     count, moments = layout.mesh.borders.size, layout.fractions
     rows = start + len(path) * np.arange(count)
     return [
-        Rows("path", x.name, number, rows + i, moments, x.lower, x.upper, x.size) for i, x in enumerate(path)
+        RowGroup("path", x.name, number, rows + i, moments, x.lower, x.upper, x.size)
+        for i, x in enumerate(path)
     ]
 
 
