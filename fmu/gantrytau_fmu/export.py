@@ -116,8 +116,11 @@ def _translated(
     if isinstance(model, Dae):
         if given or states is not None:
             raise ModelError(
-                "found a translated model with given= or states=, expected these where it is translated; give the model "
-                "itself, or translate(model, given=..., states=...)",
+                "found a translated model with ",
+                Given("given"),
+                " or ",
+                Given("states"),
+                ", expected these where it is translated; give the model itself, or translate(model, given=..., states=...)",
                 place="export_fmu",
             )
         return model

@@ -18,7 +18,7 @@ from gantrytau.answers.linear_systems.discretisation import held
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.sample_to_sample import DrivenRows, from_sample_to_sample
 from gantrytau.border.checks import number
-from gantrytau.border.refusal import InitializationError, ModelError, StructureError, did_you_mean
+from gantrytau.border.refusal import Given, InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
@@ -119,10 +119,8 @@ def linearize(
     columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))
     for name in columns:
         if name not in dae.inputs:
-            raise ModelError(
-                f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}",
-                argument="inputs",
-            )
+            words = f"{name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}"
+            raise ModelError(words, place="inputs", argument="inputs")
     _expanded(dae, "outputs", names(outputs or ()))
     dae = _with_outputs(dae, names(outputs or ()))
     values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
@@ -185,9 +183,8 @@ def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translat
     scalars = given_scalars(dae, parameters)
     for name in scalars:
         if name not in dae.table.symbols:
-            raise ModelError(
-                f"parameters: {name} is a variable of {dae.name}; give it in at=", argument="parameters"
-            )
+            words = f"{name} is a variable of {dae.name}; give it in "
+            raise ModelError(words, Given("at"), place="parameters", argument="parameters")
     return retranslate(dae, with_values(dae.flat, scalars))
 
 
@@ -206,9 +203,8 @@ def _checked(dae: Translated, at: Mapping[str, Any]) -> dict[str, float]:
     scalars = given_scalars(dae, at)
     for name in scalars:
         if name in dae.table.symbols:
-            raise ModelError(
-                f"at: {name} is a parameter of {dae.name}; give it in parameters=", argument="at"
-            )
+            words = f"{name} is a parameter of {dae.name}; give it in "
+            raise ModelError(words, Given("parameters"), place="at", argument="at")
     return scalars
 
 
@@ -248,9 +244,9 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
         except InitializationError as error:
             failures.append(error)
     raise InitializationError(
-        f"{failures[-1]}. Every derivative is zero there, and {', '.join(at) or 'nothing'} held: hold less in at=, start "
-        "nearer to a point of rest, or linearize about a motion with steady=False"
-    )
+        f"{failures[-1]}. Every derivative is zero there, and {', '.join(at) or 'nothing'} held: hold less in ",
+        Given("at"), ", start nearer to a point of rest, or linearize about a motion with ", Given("steady", False),
+    )  # fmt: skip
 
 
 def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
@@ -262,15 +258,12 @@ def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float
             continue
         alias = dae.root(name)
         if alias is None:
-            raise ModelError(
-                f"at: {name} follows from other variables of {dae.name}; give those", argument="at"
-            )
+            raise ModelError(f"{name} follows from other variables; give those", place="at", argument="at")
         offset, still = dae.number(alias.offset), alias.root is None or alias.order > 0
         value = given - offset if alias.root is None else dae.number(alias.root_value(given))
         if still and abs(value) > 1e-9 * max(1.0, abs(given)):
-            raise InitializationError(
-                f"at: {name} is {given:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
-            )
+            words = f"{name} is {given:g}, but at rest it is {offset:g}; leave it out, or linearize with "
+            raise InitializationError(words, Given("steady", False), place="at", argument="at")
         if not still:
             values[alias.symbol] = value
             held.add(alias.symbol)

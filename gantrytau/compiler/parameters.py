@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.border.units import given
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
@@ -49,24 +49,19 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
     if not values:
         return flat
     if not isinstance(values, Mapping):
-        raise ModelError(
-            f"{flat.name}: found {type(values).__name__} as parameters, expected names and their values, {{name: value}}"
-        )
+        raise ModelError("expected {name: value}", place=flat.name, found=Given("parameters", values))
     remaining = dict(values)
     known = [*(p.name for p in flat.parameters), *(e for p in flat.parameters for e in p.elements)]
     for name in values:
+        variable = name.removesuffix(".start")
+        if name not in known and (variable in flat.vectors or variable in flat.scalars):
+            words = f"{flat.name} has no parameter '{name}'; {variable} is a variable, its start goes in "
+            raise ModelError(words, Given("starts"), argument="parameters")
         if name not in known:
-            raise ModelError(f"{flat.name} has no parameter '{name}'{_remedy(flat, name, known)}")
+            words = f"{flat.name} has no parameter '{name}'{did_you_mean(name, known)}"
+            raise ModelError(words, argument="parameters")
     flat.refuse_twice("parameters", values)
     return replace(flat, parameters=tuple(_with_value(p, remaining) for p in flat.parameters))
-
-
-def _remedy(flat: FlatModel, name: str, known: list[str]) -> str:
-    """The end of a message about what is no parameter."""
-    variable = name.removesuffix(".start")
-    if variable in flat.vectors or variable in flat.scalars:
-        return f"; {variable} is a variable, simulate takes another start value of it as starts={{'{variable}': ...}}"
-    return did_you_mean(name, known)
 
 
 def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:

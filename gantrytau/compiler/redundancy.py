@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import InitializationError
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.compiler.refusals import open_loops, overdriven
+from gantrytau.compiler.refusals import open_loops
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues, start_values
@@ -290,7 +290,11 @@ def _refuse_conflicts(
     rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)
     against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
     if against:
-        raise overdriven(flat, inputs, against)
+        raise StructureError(
+            f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
+            "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: leave "
+            "one drive out, or drive by a force"
+        )
 
 
 def _refuse_drives(

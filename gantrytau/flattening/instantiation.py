@@ -59,12 +59,13 @@ class Placed:
 class Instance:
     """An instantiated model: the root whose members are symbols, and lists of all that is in it."""
 
-    root: Any
-    symbols: Symbols
-    quantities: list[Placed]
-    components: list[tuple[str, Any]]
-    connectors: list[tuple[str, Any, str]]  # path, connector, path of the component it belongs to
-    paths: dict[int, str]  # id of a component or connector -> its path
+    root: Any = None
+    symbols: Symbols = field(default_factory=Symbols)
+    quantities: list[Placed] = field(default_factory=list)
+    components: list[tuple[str, Any]] = field(default_factory=list)
+    # path, connector, path of the component it belongs to
+    connectors: list[tuple[str, Any, str]] = field(default_factory=list)
+    paths: dict[int, str] = field(default_factory=dict)  # id of a component or connector -> its path
 
     def path(self, member: Any) -> str:
         """The dotted path of a component or connector of this model."""
@@ -89,23 +90,18 @@ def instantiate(model: Model) -> Instance:
         model = _made(model)
     if not isinstance(model, Model):
         raise ModelError(f"found {type(model).__name__}, expected a Model (an instance, or its class)")
-    builder = _Builder(model.chosen_starts)
-    root = builder.build(model, "", {}, None, [])
-    builder.resolve_outers()
-    return Instance(
-        root, builder.symbols, builder.quantities, builder.components, builder.connectors, builder.paths
-    )
+    found = _Growing(chosen=model.chosen_starts)
+    found.root = found.build(model, "", {}, None, [])
+    found.resolve_outers()
+    return found
 
 
-class _Builder:
-    def __init__(self, chosen: frozenset[str]) -> None:
-        self.chosen = chosen
-        self.symbols = Symbols()
-        self.quantities: list[Placed] = []
-        self.components: list[tuple[str, Any]] = []
-        self.connectors: list[tuple[str, Any, str]] = []
-        self.paths: dict[int, str] = {}
-        self.outers: list[tuple[Any, str, Outer, list[Any]]] = []
+@dataclass(eq=False)
+class _Growing(Instance):
+    """An instance while it is built. chosen: starts that whoever uses the model said; outers: references to resolve."""
+
+    chosen: frozenset[str] = frozenset()
+    outers: list[tuple[Any, str, Outer, list[Any]]] = field(default_factory=list)
 
     def build(self, template: Declared, path: str, outer: Mapping[Any, Any], scope: Any, around: list[Any]):
         cls = type(template)

@@ -248,9 +248,7 @@ def test_singular_starts_idle_forces_and_the_time_are_refused():
     stretched = TwoLinkArm(phi_a=dict(start=0.3), phi_b=dict(start=0.3))
     with pytest.raises(StructureError, match="x, y cannot be moved at will by tau_a, tau_b"):
         extract_mechanism(stretched, **ARM)
-    with pytest.raises(
-        StructureError, match=r"z cannot be moved at will by idle, expected .* forces that act"
-    ):
+    with pytest.raises(StructureError, match=r"z cannot be moved at will by idle, expected .* forces"):
         extract_mechanism(WindyLift(), tool="z", joints=["q"], forces=["idle"])
     with pytest.raises(StructureError, match="WindyLift: its equations depend on time explicitly, expected"):
         extract_mechanism(WindyLift(), tool="z", joints=["q"], forces=["f"])

@@ -24,9 +24,10 @@ def read(folder, text, encoding="utf-8"):
         "x [mm]\ttimestamp\n1,0\t0\n2,5\t0,5\n\t1\n",
         "# a comment\n# x [mm],t\n1,0\n# between\n2.5,0.5\n,1\n",  # as NumPy writes a header
         '"x [mm]","t"\r\n"1","0"\r\n"2.5","0.5"\r\n"","1"\r\n',
+        "of a drive\n\nx [mm];t\n1,0;0\n2,5;0,5\n;1",  # with a title
     ],
 )
-def test_one_table_in_six_dialects(tmp_path, text):
+def test_one_table_in_seven_dialects(tmp_path, text):
     for encoding in ("utf-8", "utf-8-sig"):
         table = read(tmp_path, text, encoding)
         assert table.time is not None
@@ -77,3 +78,17 @@ def test_what_is_no_table_is_refused_with_its_line(tmp_path, text, words):
 def test_rows_keep_their_lines(tmp_path):
     table = read(tmp_path, "a,x\n\n1,2\n# no row\n3,4\n5,6\n")
     assert table.select(table.column("a") > 1).lines.tolist() == [5, 6]
+
+
+@pytest.mark.parametrize(
+    "text", ["t,x,y\n0,1,2\n1,,4\n\n2,,\n", "t;x;name\r\n0;1,5;a\r\n1;;b", "t x\n0  1\n 2 3 \n"]
+)
+def test_what_numpy_reads_at_once_is_the_same_cell_by_cell(tmp_path, text):
+    at_once = read(tmp_path, text)
+    by_cells = read(tmp_path, text.replace("0", '"0"', 1))
+    assert at_once.numbers
+    assert not by_cells.numbers
+    assert at_once.lines.tolist() == by_cells.lines.tolist()
+    for name in set(at_once.names) - {"name"}:
+        assert np.array_equal(at_once.column(name), by_cells.column(name), equal_nan=True)
+        assert at_once.texts(name) == by_cells.texts(name)

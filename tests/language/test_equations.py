@@ -48,10 +48,7 @@ def plant(statement):
 
 
 NO_EQUATIONS = [  # statements, and what is said of them
-    (
-        lambda p: [p.x] == [p.y],
-        "Python's if, and, or, max, chained comparisons and lists cannot work on symbols",
-    ),
+    (lambda p: [p.x] == [p.y], "Python's if, and, or, max, chained comparisons and lists cannot work"),
     (lambda p: p.r == [p.x, 0, 0], "Join symbols with casadi.vertcat(...) instead"),
     (lambda p: True, "found True, expected an equation"),
     (lambda p: p.r == p.q, "x is 3x1, while y is 2x1; the two operands have different shapes"),
@@ -74,10 +71,7 @@ NO_EQUATIONS = [  # statements, and what is said of them
     (lambda p: p.x == p.velocty, "Bench has no 'velocty'; did you mean 'velocity'?"),
     (lambda p: p.x == p.y.squared, "SX has no 'squared'"),
     (lambda p: p.x == ca.sinus(p.y), "casadi has no 'sinus'; did you mean"),
-    (
-        lambda p: ca.sin([p.x, p.y]) == 0,
-        "no number or expression among symbols; join lists with casadi.vertcat",
-    ),
+    (lambda p: ca.sin([p.x, p.y]) == 0, "no number or expression among symbols; join lists"),
     (lambda p: ca.cross(p.q, p.r) == 0, "Dimension of a (2x1 ) must equal that of b (3x1)"),
     (lambda p: p.r[3] == 0, "out of bounds with supplied length of 3"),
 ]
@@ -174,10 +168,7 @@ class Springs(Model):
         (lambda s: (s.mass.flange, translational.Mass().flange), "a Flange that is not part of this model"),
         (lambda s: (s.mass.flange, s.mass), r"connect\(Flange, Mass\): expected two connectors; name those"),
         (lambda s: (s.mass, s.mass), r"connect\(Mass, Mass\): expected two connectors"),
-        (
-            lambda s: (s.mass.flang, s.mass.flange),
-            r"equation 1: Mass has no 'flang'; did you mean 'flange'\?",
-        ),
+        (lambda s: (s.mass.flang, s.mass.flange), r"equation 1: Mass has no 'flang'; did you mean 'flange'"),
     ],
 )
 def test_connections_that_cannot_be(ends, message):
@@ -193,9 +184,7 @@ def test_a_missing_world_is_named_with_the_remedy():
     class Ball(Model):
         body = PointMass()
 
-    with pytest.raises(
-        ModelError, match=r"body \(PointMass\): found no World .* declare `world = World\(\)` .*Ball"
-    ):
+    with pytest.raises(ModelError, match=r"body \(PointMass\): found no World .* `world = World\(\)` .*Ball"):
         flatten(Ball())
 
 

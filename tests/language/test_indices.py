@@ -36,9 +36,7 @@ def test_an_index_out_of_an_array_names_the_array(statement, words):
             yield statement(self)
 
     array, _, index = map(re.escape, words.partition(": "))
-    with pytest.raises(
-        ModelError, match=rf"^the model \(Whole\), equation 1: {array} is out of bounds.*{index}"
-    ):
+    with pytest.raises(ModelError, match=rf"^the model \(Whole\), equation 1: {array} is out .*{index}"):
         translate(Whole())
 
 
@@ -47,7 +45,5 @@ def test_an_index_out_of_a_parameter_names_the_parameter():
         p = Parameter([1.0, 2.0])
         q = Parameter(p[2])
 
-    with pytest.raises(
-        ModelError, match=r"^q: value is p\[2\], expected a number.*: .*found the index 2, expected 0 to 1"
-    ):
+    with pytest.raises(ModelError, match=r"^q: value is p\[2\], .*found the index 2, expected 0 to 1"):
         translate(Numbers())

@@ -97,7 +97,7 @@ def test_the_time_has_a_unit_too(run):
         ({"phy": "deg"}, r"found 'phy', expected the name of a variable, or its unit; did you mean 'phi'\?"),
         ({"bare": "mm"}, "found 'mm' for what has no unit, expected none"),
         ({"phi": 3}, "display: phi: found 3, expected a unit as text"),
-        (3, "found 3, expected a unit, or units by names"),
+        (3, "run: plot: found display=3, expected a unit, or {name: unit}"),
     ],
 )  # fmt: skip
 def test_units_that_cannot_be(run, display: Any, message):

@@ -92,9 +92,7 @@ def beside_each_other(
         shape = np.shape(other.response)[:2] if measured else (len(other.outputs), len(other.inputs))
         own = (len(system.outputs), len(system.inputs))
         if spectra and shape != own:
-            words = (
-                f"found {shape[0]} outputs and {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
-            )
+            words = f"found {shape[0]} outputs, {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
             raise ModelError(words, place=place, argument="beside")
         found[label] = other
     return found
@@ -135,10 +133,8 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
         check_suffix(file)
     rows, columns = len(system.outputs), len(system.inputs)
     if not 0 < rows * columns <= MOST:
-        raise ModelError(
-            f"{system.title}: plot_bode found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name "
-            "fewer in inputs= and outputs="
-        )
+        words = f"found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name fewer in "
+        raise ModelError(words, Given("inputs"), " and ", Given("outputs"), place=f"{system.title}.plot_bode")
     figure, axes = plt.subplots(
         2 * rows,
         columns,
@@ -154,9 +150,7 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
             for one in curves:
                 _draw_curve(gain, phase, one, one.response[i, j])
             gain.set_xscale("log")
-            gain.set_yscale(
-                "log" if any(np.any(np.abs(one.response[i, j]) > 0) for one in curves) else "linear"
-            )
+            gain.set_yscale("log" if any(np.any(abs(one.response[i, j]) > 0) for one in curves) else "linear")
             gain.set_ylabel(f"gain [{_ratio(system.unit(output), system.unit(name))}]")
             gain.set_title(f"{output} over {name}", fontsize="medium")
             phase.set_ylabel("phase [deg]")

@@ -66,10 +66,8 @@ def save_system(system: Saved, path: str | os.PathLike[str]) -> Path:
     path = Path(path)
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise ModelError(
-            f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}",
-            argument="path",
-        )
+        words = f"found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
+        raise ModelError(words, place=str(path), argument="path")
     with replacing(path) as partial:
         writer(system, partial)
     return path

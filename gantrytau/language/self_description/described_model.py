@@ -74,17 +74,13 @@ def _found(part: PlacedPart, name: str, title: str) -> Description:
     plain, _, index = first.partition("[")
     member = part.members.get(plain)
     if member is None:
-        raise ModelError(
-            f"describe: {part.path.rstrip('.') or title} has no '{plain}'"
-            f"{did_you_mean(plain, [*part.members, *_settings(part.kind)])}",
-            argument="name",
-        )
+        hint = did_you_mean(plain, [*part.members, *_settings(part.kind)])
+        words = f"{part.path.rstrip('.') or title} has no '{plain}'{hint}"
+        raise ModelError(words, place="describe", argument="name")
     if isinstance(member, Quantity):
         if rest:
-            raise ModelError(
-                f"describe: found '{name}', but {plain} is a {type(member).__name__}, which has no parts; ask for '{first}'",
-                argument="name",
-            )
+            words = f"{plain} is a {type(member).__name__}, which has no parts; ask for '{first}'"
+            raise ModelError(f"found '{name}', but ", words, place="describe", argument="name")
         return _of_quantity(part, plain)
     if not hasattr(member, "members") and not isinstance(member, Array):
         return Description(f"{part.path}{plain}", f"the {member.component.__name__} around it (outer)")
@@ -94,10 +90,8 @@ def _found(part: PlacedPart, name: str, title: str) -> Description:
             return _of_array(part, plain, parts)
         number = index.rstrip("]")
         if not number.isdigit() or int(number) >= len(parts):
-            raise ModelError(
-                f"describe: found {first}, expected an index from 0 to {len(parts) - 1}, as {plain}[0]",
-                argument="name",
-            )
+            words = f"found {first}, expected an index from 0 to {len(parts) - 1}, as {plain}[0]"
+            raise ModelError(words, place="describe", argument="name")
         parts = [parts[int(number)]]
     found = parts[0]
     return _found(found, rest, title) if rest else _of_part(found, f"{part.path}{first}")
@@ -153,9 +147,7 @@ def _quantities(part: PlacedPart) -> Iterator[Listing]:
     for kind, heading in HEADINGS.items():
         names = [name for name, m in members.items() if m.kind == kind]
         column = "value" if kind == "parameter" else "start"
-        rows = [
-            (_with_shape(members[n]), _spoken(part, n), _unit(members[n]), _words(part, n)) for n in names
-        ]
+        rows = [(_with_shape(m := members[n]), _spoken(part, n), _unit(m), _words(part, n)) for n in names]
         if rows:
             yield Listing.of(heading, ("name", column, "unit", "description"), rows)
 

@@ -198,9 +198,7 @@ def test_names_that_are_not_there_are_refused(name):
 
 
 def test_a_text_is_no_model():
-    with pytest.raises(
-        ModelError, match=r"found the text 'Revolute', expected a model.*describe\(Revolute\)"
-    ):
+    with pytest.raises(ModelError, match=r"the text 'Revolute', expected a model.*describe\(Revolute\)"):
         describe("Revolute")
 
 

@@ -5,8 +5,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gantrytau import ModelError, did_you_mean
-from gantrytau.border.units import USUAL, scale
+from gantrytau import ModelError
+from gantrytau.border.columns import Columns
+from gantrytau.border.units import scale
 
 WORDS = {  # last part of a column's name, in small letters -> what it is
     **dict.fromkeys(("t", "time", "timestamp"), "t"),
@@ -26,28 +27,8 @@ EXPECTED = (
     "expected t,q1,q2,q3,f1,f2,f3, or time,carts[0].s,...,carts[0].f,..., and perhaps v1,v2,v3 and x,y,z, each with its "
     "unit if that is not SI: 'q1 [mm]'"
 )
-_UNIT = re.compile(r"(?P<name>.*?\S)\s*(?:\[(?P<square>[^\d\]][^\]]*)\]|\((?P<round>[^\d)][^)]*)\))$")
 _FLAT = re.compile(r"(?P<word>[a-z]+)_?(?:\[(?P<from_0>\d+)\]|(?P<from_1>\d*))$")
 _NUMBER = re.compile(r"(?P<before>.*?)_?\[?(?P<number>\d+)\]?(?P<after>[^\d]*)$")
-
-
-@dataclass(frozen=True)
-class LogColumn:
-    """A column that is read: its place in the file, and the factor that makes its values SI."""
-
-    place: int
-    factor: float
-
-
-@dataclass(frozen=True)
-class LogColumns:
-    """The columns that are read: time, positions and forces; speeds or None; tool positions or None."""
-
-    t: LogColumn
-    q: tuple[LogColumn, ...]
-    f: tuple[LogColumn, ...]
-    v: tuple[LogColumn, ...] | None
-    r: tuple[LogColumn, ...] | None
 
 
 @dataclass(frozen=True)
@@ -55,51 +36,33 @@ class _Header:
     place: int
     text: str
     name: str
-    unit: str
+    unit: str | None
 
 
-def columns_of(path: object, header: Sequence[str]) -> LogColumns:
+def columns_of(table: Columns) -> dict[str, list[int]]:
     """The columns of a log by the names in its header, in any order; those with other names are not read.
 
-    Raises ModelError for columns that are missing, stand twice, could be meant in two ways, or have an unknown unit.
+    Their indices in the order of the actuators: one of "t", those of "q" and "f", and of "v" and "r" where they are there.
+    Raises ModelError for columns that are missing, stand twice, or could be meant in two ways.
     """
-    heads = [_head(k, text) for k, text in enumerate(header)]
-    place = f"{path}: found the header {', '.join(header)[:300]}"
+    heads = [
+        _Header(k, text, name.lower(), table.units[k])
+        for k, (text, name) in enumerate(zip(table.header, table.names, strict=True))
+    ]
+    place = f"{table.path}: found the header {', '.join(table.header)[:300]}"
     tool = _tool(place, heads)
     times = [head for head in heads if WORDS.get(head.name) == "t"]
     if len(times) != 1:
         raise ModelError(f"{place}: found {len(times) or 'no'} columns of time; {EXPECTED}")
     joints = _joints(place, heads, {head.place for head in tool or ()})
-    found = {kind: tuple(_column(place, head, kind) for head in part) for kind, part in joints.items()}
     for position, force in zip(joints["q"], joints["f"], strict=True):
         if _is_of(position, "m") and _is_of(force, "N.m"):
             raise ModelError(
                 f"{place}: found {force.text} beside {position.text}, expected a force along a length; divide torques of "
                 "motors by the radius of the transmission, and write N"
             )
-    r = None if tool is None else tuple(_column(place, head, "r") for head in tool)
-    return LogColumns(_column(place, times[0], "t"), found["q"], found["f"], found.get("v"), r)
-
-
-def _head(place: int, text: str) -> _Header:
-    text = text.strip()
-    unit = _UNIT.match(text)
-    name = unit["name"] if unit else text
-    return _Header(
-        place, text, name.strip().lower(), (unit["square"] or unit["round"]).strip() if unit else ""
-    )
-
-
-def _column(place: str, head: _Header, kind: str) -> LogColumn:
-    if not head.unit:
-        return LogColumn(head.place, 1.0)
-    if not any(_is_of(head, unit) for unit in UNITS[kind]):
-        known = [text for unit in UNITS[kind] for text in (unit, *USUAL[unit])]
-        raise ModelError(
-            f"{place}: found the unit {head.unit} of {head.name}, expected one of {', '.join(known)}"
-            + did_you_mean(head.unit, known).partition("; there is")[0]
-        )
-    return LogColumn(head.place, scale(head.unit).slope)
+    found = {"t": times, **joints} | ({"r": tool} if tool else {})
+    return {kind: [head.place for head in each] for kind, each in found.items()}
 
 
 def _is_of(head: _Header, unit: str) -> bool:

@@ -8,14 +8,14 @@ from typing import Any, Self
 
 import numpy as np
 
-from gantrytau import Model, ModelError, Result, translate
+from gantrytau import Columns, Model, ModelError, Result, translate
 from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
-from gantrytau_optimica.identification.logs.log_files import lines_of, read_log, write_log
+from gantrytau_optimica.identification.logs.log_files import read_log, write_log
 from gantrytau_optimica.identification.logs.lost_rows import lost_rows
 from gantrytau_optimica.identification.spectra.sampled_motion import rows_of
 
@@ -66,7 +66,7 @@ class MotionLog(Record):
     @staticmethod
     def lines(path: str | Path, rows: Any) -> np.ndarray:
         """Lines of a file that `read` reads, from 1, in which rows of its log stand, which count from 0."""
-        return lines_of(Path(path), np.asarray(rows, dtype=int))
+        return Columns.read(path).lines[np.asarray(rows, dtype=int)]
 
     @classmethod
     def of(

@@ -14,7 +14,7 @@ from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from tests.optimica.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
 from tests.optimica.calibration.linear_data import carts
-from tests.optimica.calibration.refusals import refused
+from tests.optimica.refusals import refused
 
 # Table 5.4, Dressler (2012); 1u2 is turntables[0].orientation, 1u3 and 2u3 those of [1] and [2], r3 turntables[2].offset
 TABLE_5_4 = {

@@ -16,8 +16,8 @@ from gantrytau_optimica.calibration.links.arm_factors import scales
 from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.optimica.calibration.f1_data import f1_arms, f1_poses
 from tests.optimica.calibration.linear_data import three_link_poses
-from tests.optimica.calibration.refusals import refused
 from tests.optimica.calibration.synthetic import grid
+from tests.optimica.refusals import refused
 
 
 @pytest.fixture(scope="module")

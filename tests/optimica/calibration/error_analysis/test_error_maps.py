@@ -8,7 +8,7 @@ from gantrytau import ModelError
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.error_analysis.error_maps import error_map
-from tests.optimica.calibration.refusals import refused
+from tests.optimica.refusals import refused
 
 matplotlib.use("Agg")
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from gantrytau import ModelError
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.error_analysis.guideways import Cyclic, Linearity, linearity
-from tests.optimica.calibration.refusals import refused
+from tests.optimica.refusals import refused
 
 matplotlib.use("Agg")
 

@@ -16,7 +16,7 @@ from gantrytau_optimica.calibration.error_analysis.orientation_errors import (
     orientation_causes,
     orientation_errors,
 )
-from tests.optimica.calibration.refusals import refused
+from tests.optimica.refusals import refused
 
 matplotlib.use("Agg")
 
