@@ -71,9 +71,9 @@ def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
             held = np.zeros((fit.minimum.rank, len(fit.x)))
             held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
             numbers = numbers @ np.vstack([held, np.eye(len(fit.x))[~here.free]]).T
-        by_pose = [link.by_pose(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
+        by_pose = [link.by_pose(here.parameters(k, fit.x)) for k, link in enumerate(here.chains)]
         place, turn = (np.stack(each, axis=1) for each in zip(*by_pose, strict=True))
-        slopes = [link.by_actuator(here.numbers(k, fit.x)) for k, link in enumerate(here.chains)]
+        slopes = [link.by_actuator(here.parameters(k, fit.x)) for k, link in enumerate(here.chains)]
         # errors of links on straight guideways are squares of lengths: in m where T moves them by as much as itself
         unit = np.median(np.linalg.norm(place, axis=2), axis=0)
         actuators = {

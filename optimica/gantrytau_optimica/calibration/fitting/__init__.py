@@ -1,1 +1,1 @@
-"""Rods and arms brought to their minima, and how sure their numbers are."""
+"""Rods and arms brought to their minima, and how sure their parameters are."""

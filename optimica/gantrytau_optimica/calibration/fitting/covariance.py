@@ -1,10 +1,10 @@
-"""How sure identified numbers are, from the noise of measured poses.
+"""How sure identified parameters are, from the noise of measured poses.
 
     e_ik = |y_ik|^2 - L_i^2,    de_ik = 2 y_ik . dT_k + 2 (R_k B_i x y_ik) . dphi_k = u_ik . dT_k + w_ik . dphi_k
     cov(e_ik, e_jk) = s^2 u_ik . u_jk + a^2 w_ik . w_jk
     p = -(J'WWJ)^-1 J'WWe       cov p = (J'WWJ)^-1 J'WW cov(e) WWJ (J'WWJ)^-1
 
-Links share the noise of a pose, so that numbers of different links vary together. The deviations s of a coordinate and a
+Links share the noise of a pose, so that parameters of different links vary together. The deviations s of a coordinate and a
 of a turn about an axis are those with which the products of closure errors agree best. For one link alone this is
 4 s^2 L^2 (J'J)^-1, the Cramer-Rao bound of its closure errors. Where positions have a covariance C of their own, C^1/2 u
 stands for u, C in units of its median size, and w is worse by as much; W are the weights of the fit.
@@ -35,7 +35,9 @@ def link_noise(
     for fit in fits:
         distances, known = fit.distances(), 0.0
         if spreads is not None:
-            along = [link.by_pose(fit.group.numbers(k, fit.x))[0] for k, link in enumerate(fit.group.chains)]
+            along = [
+                link.by_pose(fit.group.parameters(k, fit.x))[0] for k, link in enumerate(fit.group.chains)
+            ]
             seen = np.column_stack([_seen(u, spreads) for u in along])
             distances = distances / seen
             known = 0.0 if shared is None else _shared_squares(fit, along, shared, seen)
@@ -57,7 +59,7 @@ def link_noise(
 
 
 def _shared_squares(fit: Fit, along: list[np.ndarray], shared: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """What errors that poses share leave of the squares of distances of each link, once numbers followed them, (links,)."""
+    """Squares of distances of each link, (links,), by errors that poses share and that parameters cannot follow."""
     unit = [np.linalg.norm(u, axis=1) * f for u, f in zip(along, seen.T, strict=True)]
     X = np.stack([np.einsum("ni,nik->nk", u, shared) / s[:, None] for u, s in zip(along, unit, strict=True)])
     J = np.stack([fit.group.link_jacobian(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
@@ -81,7 +83,7 @@ def pose_noise(
     """Deviations s in m and a in rad of measured poses, and factors (links,) by which links are worse than these say.
 
     errors: (N, links); by_place, by_turn: u and w, (N, links, 3), w zero where plates do not turn; freedom: of each link,
-    N less its share of the numbers. Factors are 1 unless errors of the model make links differ.
+    N less its share of the parameters. Factors are 1 unless errors of the model make links differ.
     """
     i, j = np.triu_indices(errors.shape[1])
     share = np.sqrt(freedom / len(errors))
@@ -98,7 +100,7 @@ def pose_noise(
 
 
 def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Least squares for two numbers of which none is below zero."""
+    """Least squares for two parameters of which none is below zero."""
     if design[:, 1].any():
         found = np.linalg.lstsq(design, right, rcond=None)[0]
         if (found >= 0).all():
@@ -111,7 +113,7 @@ def _not_negative(design: np.ndarray, right: np.ndarray) -> np.ndarray:
 def joint_covariance(
     fits: Sequence[Fit], loss: str, spreads: np.ndarray | None = None, shared: np.ndarray | None = None
 ) -> np.ndarray:
-    """Covariance of the free numbers of all fits one after another, (n, n); zero in directions that data do not hold.
+    """Covariance of the free parameters of all fits one after another, (n, n); zero in directions that data do not hold.
 
     spreads: as of `link_noise`; shared: `Measurements.shared` of the fitted poses, F (N, 3, k), which moves all of them at
     once by u F.
@@ -126,7 +128,7 @@ def joint_covariance(
         J = fit.group.link_jacobian(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
         middle[part] += np.einsum("np,na->pna", J, by_pose)
         if shared is not None:
-            u = fit.group.chains[k].by_pose(fit.group.numbers(k, fit.x))[0]
+            u = fit.group.chains[k].by_pose(fit.group.parameters(k, fit.x))[0]
             together[part] += J.T @ np.einsum("ni,nik->nk", u, shared)
     priors = np.asarray(block_diag(*[_of_prior(fit) for fit in fits]))
     inverses = [as_told(fit) @ fit.minimum.inverse for fit in fits]
@@ -142,7 +144,7 @@ def _moved(
     shared: np.ndarray | None,
 ) -> list[np.ndarray]:
     """(s u, a w) of each link, (N, 6): what noise of a pose, one deviation along each axis, adds to its closure errors."""
-    turned = [fits[f].group.chains[k].by_pose(fits[f].group.numbers(k, fits[f].x)) for f, k in parts]
+    turned = [fits[f].group.chains[k].by_pose(fits[f].group.parameters(k, fits[f].x)) for f, k in parts]
     worse = np.ones(1)
     if spreads is not None:
         worse = np.sqrt(np.trace(spreads @ spreads, axis1=1, axis2=2) / 3)[:, None]
@@ -168,7 +170,7 @@ def _of_prior(fit: Fit) -> np.ndarray:
 
 
 def as_told(fit: Fit) -> np.ndarray:
-    """Derivatives of the numbers that are reported by those that were moved, (n, n)."""
+    """Derivatives of the parameters that are reported by those that were moved, (n, n)."""
     whole = np.eye(len(fit.x))
     for link, places in zip(fit.group.chains, fit.group.places, strict=True):
         told = link.told(fit.x[places])

@@ -15,10 +15,10 @@ from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
 from gantrytau_optimica.calibration.links.groups import Group
 from gantrytau_optimica.fitting.least_squares import Minimum
 
-TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
+TOLERANCE = 1e-8  # deviations, about, of parameters: of the gradient of the cost in squares of the noise
 ROUNDED = 1e-6  # the same of closure errors of turntables, whose roundings leave 5e-7
 LEAST = 1e-9  # m2 or m, of the noise: rounding of closure errors is far below it
-LEAST_STEP = 1e-6  # the same where numbers are led to a limit, in steps of their deviations
+LEAST_STEP = 1e-6  # the same where parameters are led to a limit, in steps of their deviations
 # where rounding ends the descent before the gradient is that small
 AT_ROUNDING = ("Search_Direction_Becomes_Too_Small", "Solved_To_Acceptable_Level")
 OPTIONS = {
@@ -74,8 +74,8 @@ def _solved(fit: Fit, constraints: Sequence[ParameterConstraint]) -> Fit:
             f"Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a minimum{remedy}",
             place="calibrate",
         )
-    numbers = group.x.copy()
-    numbers[free] = middle + steps @ np.array(found["x"]).ravel()
+    parameters = group.x.copy()
+    parameters[free] = middle + steps @ np.array(found["x"]).ravel()
     across = np.eye(len(free))
     if constraints:
         value = np.array(found["g"]).ravel()
@@ -87,7 +87,7 @@ def _solved(fit: Fit, constraints: Sequence[ParameterConstraint]) -> Fit:
         _, sizes, across = np.linalg.svd(normals, full_matrices=True)
         across = across[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
     at = group.condensed(fit.weights).minimum(
-        numbers, fit.noise, smallest=fit.smallest, along=across, steps=0
+        parameters, fit.noise, smallest=fit.smallest, along=across, steps=0
     )
     rank = at.rank if constraints else rank
     minimum = replace(at, rank=rank, iterations=int(stats["iter_count"]), success=True)
@@ -120,7 +120,7 @@ def _solver(rows: ca.MX, unknown: ca.MX, kept: ca.MX, arms: bool, options: dict[
 
 
 def _steps(fit: Fit, noise: float) -> np.ndarray:
-    """One deviation of the numbers along each direction, of those that data do not hold by tape, in columns, (n, n).
+    """One deviation of the parameters along each direction, of those that data do not hold by tape, in columns, (n, n).
 
     In these steps the curvature of the cost is the same along all directions.
     """
@@ -131,7 +131,7 @@ def _steps(fit: Fit, noise: float) -> np.ndarray:
 
 
 def _merged(fits: Sequence[Fit]) -> Fit:
-    """Several fits as one, whose numbers stand one after another."""
+    """Several fits as one, whose parameters stand one after another."""
     starts = np.cumsum([0, *(len(fit.x) for fit in fits)])
     groups, minima = [fit.group for fit in fits], [fit.minimum for fit in fits]
     placed = list(zip(groups, starts[:-1].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Identified numbers under the names of the robot's parameters, and as links that kinematics understands."""
+"""Identified parameters by the names of the robot, and as links that kinematics understands."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -76,7 +76,7 @@ def named_parameters(robot: NominalRods, fits: Sequence[Fit]) -> dict[str, Any]:
 
 
 def calibrated_arms(fits: Sequence[Fit]) -> list[ArmClosure]:
-    """Arms on turntables with their identified numbers."""
+    """Arms on turntables with their identified parameters."""
     found: dict[int, ArmClosure] = {}
     for fit in fits:
         for link, places in zip(fit.group.chains, fit.group.places, strict=True):
@@ -86,7 +86,7 @@ def calibrated_arms(fits: Sequence[Fit]) -> list[ArmClosure]:
 
 
 def rod_links(fits: Sequence[Fit]) -> list[RodLink]:
-    """The links with their identified numbers, in the order of the arms."""
+    """The links with their identified parameters, in the order of the arms."""
     found = []
     for fit in fits:
         for link, places in zip(fit.group.chains, fit.group.places, strict=True):

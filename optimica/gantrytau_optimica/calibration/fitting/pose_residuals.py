@@ -50,7 +50,7 @@ class PoseResiduals(Record):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the numbers x."""
+        """Of the parameters x."""
         return self.tool.names if self.turn is None else (*FRAME, *self.tool.names)
 
     @property
@@ -123,7 +123,7 @@ class PoseResiduals(Record):
 
 
 def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseResiduals, Array]:
-    """The residuals and where their numbers begin: nominal values, in the frame in which these fit best."""
+    """The residuals and where their parameters begin: nominal values, in the frame in which these fit best."""
     sure = np.ones(len(data)) if data.certainty is None else data.certainty
     if not framed:
         return PoseResiduals(tool, data, None, LEVER, sure, {}), tool.nominal

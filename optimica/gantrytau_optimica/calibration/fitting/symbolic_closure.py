@@ -27,22 +27,22 @@ def errors_of(group: Group, x: ca.MX) -> Iterator[ca.MX]:
 def _of_chain(chain: Chain, p: ca.MX) -> ca.MX:
     """Errors (N, 1), as `Chain.error` writes them, all poses by one function that is mapped."""
     N = len(chain.q)
-    numbers, q, T, R = ca.SX.sym("p", chain.size), ca.SX.sym("q"), ca.SX.sym("T", 3), ca.SX.sym("R", 3, 3)
+    parameters, q, T, R = ca.SX.sym("p", chain.size), ca.SX.sym("q"), ca.SX.sym("T", 3), ca.SX.sym("R", 3, 3)
     if chain.points is None:
-        along = q * numbers[4:7]
+        along = q * parameters[4:7]
         data = chain.q[None]
     else:  # Q a with the rotation vector as exponential
-        a, w = ca.SX.sym("a", 3), numbers[4:7]
+        a, w = ca.SX.sym("a", 3), parameters[4:7]
         turned = ca.DM(np.eye(3) if chain.turned is None else chain.turned)
         along = _turn(w) @ turned @ a
         q, data = a, chain.points.T
-    y = T - numbers[1:4] - along
+    y = T - parameters[1:4] - along
     given, columns = [q, T], [data, chain.r.T]
     if chain.R is not None:
-        y += R @ numbers[7:10]
+        y += R @ parameters[7:10]
         given.append(ca.vec(R))
         columns.append(_columns(chain.R))
-    one = ca.Function("closure", [numbers, *given], [ca.sumsqr(y) - numbers[0] ** 2])
+    one = ca.Function("closure", [parameters, *given], [ca.sumsqr(y) - parameters[0] ** 2])
     return one.map(N)(ca.repmat(p, 1, N), *(ca.DM(c) for c in columns)).T
 
 

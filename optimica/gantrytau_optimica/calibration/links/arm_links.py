@@ -14,7 +14,7 @@ STEP = 1e-5  # m or rad, of differences by an actuator
 class ArmOverPoses:
     """An arm over poses q (N, n), r (N, 3), R (N, 3, 3), worked out for all of its links at once.
 
-    Its numbers p are changes of the unknowns of the arm as it was given; local rotations are d of R(u) exp([d]x).
+    Its parameters p are changes of the unknowns of the arm as it was given; local rotations are d of R(u) exp([d]x).
     """
 
     def __init__(self, arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None):
@@ -25,7 +25,7 @@ class ArmOverPoses:
         self._known: tuple[bytes, np.ndarray, np.ndarray] = (b"", self.start, self.start)
 
     def moved(self, p: np.ndarray) -> ArmClosure:
-        """The arm with these numbers."""
+        """The arm with these parameters."""
         return self.arm.moved(p - self.start)
 
     def closure(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -114,7 +114,7 @@ class ArmLink(Record):
         return u, np.cross(here.R @ arm.vector_of(arm.said.rods[self.j].plate_offset), u)
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the numbers that are reported by those that are moved; None for the same."""
+        """Derivatives of the parameters that are reported by those that are moved; None for the same."""
         return self.poses.told(p)
 
     def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "ArmLink":

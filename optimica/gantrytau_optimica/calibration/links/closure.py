@@ -4,7 +4,7 @@
     linear guideway         A(q) = A + q v                                              (4.13)
     measured guideway       A(q) = o + Q a(q), a(q) between measured points             (5.6), (5.7)
 
-N poses, numbers of one link in the order (L, A or o, v or turn, B): 7, or 10 where the plate turns. Q is exp(turn) times
+N poses, parameters of one link in the order (L, A or o, v or turn, B): 7, or 10 where the plate turns. Q is exp(turn) times
 a rotation that is given, so that turn stays small. Dressler (2012), sections 4.4, 5.2 and 5.3.
 """
 
@@ -44,11 +44,11 @@ class Chain(Record):
 
     @property
     def size(self) -> int:
-        """How many numbers the link has."""
+        """How many parameters the link has."""
         return 7 if self.R is None else 10
 
     def vector(self, p: np.ndarray) -> np.ndarray:
-        """y, from the joint on the cart to that on the plate, (N, 3) in m; p: numbers of the link."""
+        """y, from the joint on the cart to that on the plate, (N, 3) in m; p: parameters of the link."""
         y = self.r - p[OFFSET]
         y -= self.q[:, None] * p[ALONG] if self.points is None else self._on_guideway(p)
         if self.R is not None:
@@ -96,7 +96,7 @@ class Chain(Record):
         return np.linalg.norm(self.vector(p), axis=1) - p[0]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the numbers that are reported by those that are moved, (size, size), None for the same.
+        """Derivatives of the parameters that are reported by those that are moved, (size, size), None for the same.
 
         Turns of measured guideways are moved before a rotation that was given: what is reported is the rotation vector W of
         both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
@@ -131,7 +131,7 @@ class Chain(Record):
 class Condensed:
     """A chain with a linear guideway, its N poses replaced by a few rows that leave the same sum of squares.
 
-    e is linear in functions theta of the numbers of the link: e = F theta(p), with the columns F of (1, q, q2, T, qT,
+    e is linear in functions theta of the parameters of the link: e = F theta(p), with the columns F of (1, q, q2, T, qT,
     R'T, R, qR, T.T). With F = Z U, Z of orthonormal columns, U theta(p) has the norm of e for every p, so that each
     step of Gauss-Newton costs nothing and is the same as with all poses. q and T are taken about `centre`, for rounding.
     """

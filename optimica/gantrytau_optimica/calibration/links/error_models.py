@@ -1,6 +1,6 @@
-"""The error models of Table 5.2, as links that share numbers.
+"""The error models of Table 5.2, as links that share parameters.
 
-| model | links | guideways | numbers |
+| model | links | guideways | parameters |
 |---|---|---|---|
 | "parallel" | of the robot | straight, one direction for all, held at its nominal value | 12 |
 | None | of the robot | straight, a direction for each cart | 21 or 51 |
@@ -38,7 +38,7 @@ TURNS = 0.02  # rad; a plate that turns less than this does not hold B without a
 
 @dataclass(frozen=True)
 class ModelLink:
-    """One link of a model: path of its arm, its poses, names of its numbers, start values, which of them are
+    """One link of a model: path of its arm, its poses, names of its parameters, start values, which of them are
     identified, and what of each moves a joint by a metre.
     """
 
@@ -183,7 +183,7 @@ def started_linear(links: Sequence[ModelLink]) -> list[ModelLink]:
     starts = []
     for link in links:
         chain, R = link.chain, link.chain.R
-        assert isinstance(chain, Chain)  # closure is linear in the numbers of linear guideways only
+        assert isinstance(chain, Chain)  # closure is linear in the parameters of linear guideways only
         if R is not None and _turn(R) < TURNS:
             start = linear_start(replace(chain, R=None))
             start[1:4] += mean_rotation(R) @ link.start[7:10]
@@ -261,7 +261,7 @@ def on_rail(link: ModelLink, rail: np.ndarray, turned: np.ndarray | None = None)
 
 
 def grouped(links: Sequence[ModelLink]) -> list[Group]:
-    """Links that share names of identified numbers become one group, in the order of their first link."""
+    """Links that share names of identified parameters become one group, in the order of their first link."""
     left, groups = list(links), []
     while left:
         members, shared = [left.pop(0)], set()

@@ -11,17 +11,17 @@ from gantrytau_optimica.calibration.links.arm_links import ArmLink, ArmOverPoses
 from gantrytau_optimica.calibration.links.closure import Chain, condense
 from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squares
 
-TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
+TAPE = 0.01  # m; combinations of parameters that data hold worse than a tape measure stay where they started
 
 
 @dataclass(frozen=True)
 class Group(Record):
-    """Links and where in the vector x of the group their numbers stand.
+    """Links and where in the vector x of the group their parameters stand.
 
-    x: start values (n,); names: of the numbers, (n,); free: which of them are identified; scale: what of each number moves
-    a joint by a metre; places: for each link the indices in x of its numbers; prior: value and deviation of numbers, by
-    index; noise: deviation of a closure error that decides what data hold, None where it is to be found from what is left;
-    tape: that of start values, m.
+    x: start values (n,); names: of the parameters, (n,); free: which of them are identified; scale: what of each moves a
+    joint by a metre; places: for each link the indices in x of its parameters; prior: value and standard deviation of
+    parameters, by index; noise: standard deviation of a closure error that decides what data hold, None where it is to be
+    found from what is left; tape: that of start values, m.
     """
 
     chains: tuple[Chain | ArmLink, ...]
@@ -34,8 +34,8 @@ class Group(Record):
     noise: float | None = None
     tape: float = TAPE
 
-    def numbers(self, k: int, x: np.ndarray) -> np.ndarray:
-        """The numbers of chain k."""
+    def parameters(self, k: int, x: np.ndarray) -> np.ndarray:
+        """The parameters of chain k."""
         return x[self.places[k]]
 
     def errors(self, x: np.ndarray) -> np.ndarray:
@@ -43,7 +43,7 @@ class Group(Record):
         return np.column_stack([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
 
     def link_jacobian(self, x: np.ndarray, k: int) -> np.ndarray:
-        """Derivatives of the errors of chain k by the free numbers, (N, free)."""
+        """Derivatives of the errors of chain k by the free parameters, (N, free)."""
         whole = np.zeros((len(self.chains[k].q), len(x)))
         whole[:, self.places[k]] = self.chains[k].jacobian(x[self.places[k]])
         return whole[:, self.free]
