@@ -63,11 +63,6 @@ EXCEPTIONS = {  # offences that are let pass; this list only shrinks
     "gantrytau_optimica.procedure.documents.files imports csv",  # writes
     "gantrytau_optimica.studies.figures imports csv",  # writes
     "gantrytau_fmu.building.compile_libraries imports importlib.util",  # asks for a package
-    "gantrytau.commands.arguments.display_option edits a message",
-    "gantrytau.commands.arguments.values edits a message",
-    "gantrytau.commands.controller.controller_file edits a message",
-    "gantrytau.commands.estimate.estimate_file edits a message",
-    "gantrytau.commands.printing.result_output edits a message",
     "gantrytau_optimica.learning.rig edits a message",
 }
 
