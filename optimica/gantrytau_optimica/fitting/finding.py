@@ -13,7 +13,7 @@ SHOWN = 8  # rows, or ranges of them, that a message lists
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class DataRows:
     """Rows of data in a sentence, "rows 3 and 4", or the lines of the file in which they stand.
 
     of: how many rows there are, where "all but row 3" may be said; lines: of all rows, (N,).
@@ -32,7 +32,7 @@ class Rows:
         return but + rows_in_words(self.lines[rows]).replace("row", "line", 1)
 
 
-Part = str | Given | Rows
+Part = str | Given | DataRows
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,10 @@ class Finding(Record):
 
 def in_lines(parts: Sequence[Part], rows: np.ndarray, lines: np.ndarray) -> list[Part]:
     """A sentence with lines in place of rows; a few rows that it does not name are added at its end."""
-    named = any(isinstance(part, Rows) for part in parts)
-    found = [replace(part, lines=lines) if isinstance(part, Rows) else part for part in parts]
+    named = any(isinstance(part, DataRows) for part in parts)
+    found = [replace(part, lines=lines) if isinstance(part, DataRows) else part for part in parts]
     few = not named and 0 < len(rows) < len(lines) / 4
-    return [*found, " (", Rows(rows, lines=lines), ")"] if few else found
+    return [*found, " (", DataRows(rows, lines=lines), ")"] if few else found
 
 
 def rows_in_words(rows: Sequence[int] | np.ndarray, of: int | None = None) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model
-from gantrytau.border.checks import array, instance, number, whole
+from gantrytau.border.checks import array, instance, whole
 from gantrytau.ensembles.parallel_map import each
 from gantrytau.kinematics import Limits, workspace
 from gantrytau.kinematics.workspace.grid_spacing import checked_places
@@ -30,15 +30,12 @@ from gantrytau_optimica.procedure.monte_carlo import (
 from gantrytau_optimica.procedure.motion_planning.ordering import Order, ordered
 from gantrytau_optimica.procedure.motion_planning.path_cache import KnownWays
 from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict, decide
-from gantrytau_optimica.procedure.plan_goal import PlanGoal
+from gantrytau_optimica.procedure.plan_goal import NAME, PlanGoal
 from gantrytau_optimica.procedure.pose_choice import PoseChoice, choose, judge
 from gantrytau_optimica.procedure.pose_plan import PlanBasis
 from gantrytau_optimica.procedure.robot_samples import Fleet, build_fleet, check_home
 from gantrytau_optimica.procedure.stages import Progress, Stages, digest
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
-
-NAME = "plan_calibration"
-LARGEST = 0.1  # m, of errors and margins; what is larger was written in mm
 
 
 def plan_calibration(
@@ -78,42 +75,22 @@ def plan_calibration(
     interruption; stages whose questions changed are done anew. progress: called with
     (stage, done, of). Raises ModelError for what does not fit, where nothing is visible or safe, or home is in a collision.
     """
-    wanted = number(NAME, "wanted", wanted, above=0.0, most=LARGEST, unit="m")
-    tape = number(NAME, "tape", tape, above=0.0, most=LARGEST, unit="m")
-    margin = number(
-        NAME, "margin", margin, above=0.0, below=LARGEST
-    )  # without one no way is shown to be clear
-    spacing = None if spacing is None else number(NAME, "spacing", spacing, above=0.0, unit="m")
-    for name, value, least in (
-        ("robots", robots, 1),
-        ("seed", seed, 0),
-        ("poses", poses, FEWEST),
-        ("places", places, 1),
-    ):
-        if value is not None or name != "places":
-            whole(NAME, name, value, least=least)
+    if places is not None:
+        whole(NAME, "places", places, least=1)
+    asked = PlanGoal(poses, wanted, tape, robots, seed, margin, spacing, home)
     instance(NAME, "limits", limits, Limits, "gantrytau.kinematics.Limits(strokes=..., ...)")
     instance(NAME, "device", device, Device, "a device such as LaserTracker((4.0, 3.0, 0.0))")
     path = None if folder is None else Path(folder)
     if path is not None:
         check_folder(NAME, path)
         path.mkdir(exist_ok=True)
-    fleet = build_fleet(robot, limits, tape=tape, robots=robots, seed=seed)
+    fleet = build_fleet(robot, limits, tape=asked.tape, robots=robots, seed=seed)
     _check_poses(fleet, poses)
     device = with_obstacles(device, limits.obstacles)
     check_device(fleet, device)
     start = _home(fleet, home)
     check_home(fleet, start)
-    asked = PlanGoal(
-        poses=poses,
-        wanted=wanted,
-        tape=tape,
-        robots=robots,
-        seed=seed,
-        margin=margin,
-        spacing=_spacing(fleet, limits, spacing, places),
-        home=start,
-    )
+    asked = replace(asked, spacing=_spacing(fleet, limits, spacing, places), home=start)
     return _Procedure(fleet, limits, device, asked, Stages(path, progress)).plan()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau_optimica import CalibrationError
-from gantrytau_optimica.fitting.finding import Finding, Rows
+from gantrytau_optimica.fitting.finding import DataRows, Finding
 
 LINES = np.array([2, 3, 5, 6, 7, 9, 10, 11, 12, 13])  # of ten rows: comments stand between
 
@@ -19,10 +19,10 @@ LINES = np.array([2, 3, 5, 6, 7, 9, 10, 11, 12, 13])  # of ten rows: comments st
     ],
 )
 def test_rows_are_said_as_lines_of_a_file(rows, of, said, in_lines):
-    finding = Finding("jump", np.array(rows), (Rows(rows, of), " are off"))
+    finding = Finding("jump", np.array(rows), (DataRows(rows, of), " are off"))
     assert finding.message == f"{said} are off"
     assert finding.in_lines(LINES).message == f"{in_lines} are off"
-    error = CalibrationError("found ", Rows(rows, of), rows=rows, place="Measurements")
+    error = CalibrationError("found ", DataRows(rows, of), rows=rows, place="Measurements")
     assert str(error) == f"Measurements: found {said}"
     assert error.in_lines(LINES).words(str) == f"found {in_lines}"
 

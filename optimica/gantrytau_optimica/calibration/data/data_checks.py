@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
+from gantrytau_optimica.fitting.finding import DataRows, Finding, agreeing
 
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
@@ -39,7 +39,9 @@ def _not_finite(finite: np.ndarray) -> Iterator[Finding]:
     bad = np.flatnonzero(~finite)
     if bad.size:
         hold, left = agreeing(bad, "hold"), agreeing(bad, "are")
-        yield Finding("nan", bad, (Rows(bad, len(finite)), f" {hold} no finite numbers and {left} left out"))
+        yield Finding(
+            "nan", bad, (DataRows(bad, len(finite)), f" {hold} no finite numbers and {left} left out")
+        )
 
 
 def _few(rows: np.ndarray) -> Iterator[Finding]:
@@ -56,7 +58,7 @@ def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Findin
             f" {agreeing(later, 'repeat')} earlier rows to the last digit; a copied row adds no knowledge but counts twice "
             "in every deviation; it is left out"
         )
-        yield Finding("duplicates", rows[later], (Rows(rows[later]), words))
+        yield Finding("duplicates", rows[later], (DataRows(rows[later]), words))
 
 
 def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
@@ -69,7 +71,7 @@ def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
             bad = rows[places]
             left = agreeing(bad, "they are")
             words = f" is that of the row before while {other} moved; {left} left out"
-            yield Finding("stuck", bad, (f"{name} of ", Rows(bad), words))
+            yield Finding("stuck", bad, (f"{name} of ", DataRows(bad), words))
 
 
 def repeated_rows(*tables: np.ndarray) -> np.ndarray:
@@ -150,7 +152,7 @@ def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
             rows[found],
             (
                 f"{names} of ",
-                Rows(rows[found]),
+                DataRows(rows[found]),
                 f" {extend} over more than {LARGEST:g} m, expected m and rad; divide by 1000 if they are mm, turn degrees "
                 "into rad",
             ),
@@ -166,7 +168,7 @@ def _rotations(R: np.ndarray | None, rows: np.ndarray) -> Iterator[Finding]:
         yield Finding(
             "rotations",
             rows[bad],
-            ("R of ", Rows(rows[bad]), " is no rotation matrix; expected R' R = I and determinant 1"),
+            ("R of ", DataRows(rows[bad]), " is no rotation matrix; expected R' R = I and determinant 1"),
         )
 
 

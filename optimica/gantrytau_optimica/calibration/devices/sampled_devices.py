@@ -12,7 +12,7 @@ from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
-from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
+from gantrytau_optimica.fitting.finding import DataRows, Finding, agreeing
 
 ROUNDING = 1e-9  # of a sample: a last instant that rounding puts behind the end is still read
 BENT = 1e-2  # of their length, by which axes are too short halfway between two rotations 16 degrees apart
@@ -139,7 +139,7 @@ class SampledDevice(Record):
             yield Finding(
                 "lost",
                 lost,
-                (Rows(lost), f" of {len(t)} {have} not seen by the {name} at [{place}] m: {where}"),
+                (DataRows(lost), f" of {len(t)} {have} not seen by the {name} at [{place}] m: {where}"),
             )
 
 

@@ -25,7 +25,7 @@ from gantrytau_optimica.calibration.diagnostics.plausibility import (
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.links.error_models import ModelLink, links_of_arms, moved
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
-from gantrytau_optimica.fitting.finding import Finding, Part, Rows, agreeing
+from gantrytau_optimica.fitting.finding import DataRows, Finding, Part, agreeing
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
@@ -55,7 +55,7 @@ def check_carts(robot: NominalRods, measurements: Measurements, rows: np.ndarray
                 "constant",
                 rows,
                 f"found q{k + 1} at {q[0]:.6g} m in ",
-                Rows(rows),
+                DataRows(rows),
                 ", expected a cart that moves; its guideway cannot be identified from these; look at that column, or "
                 "measure other poses",
             )
@@ -89,7 +89,7 @@ def in_frame(
             "another robot",
             rows,
             "found no links of constant length that fit ",
-            Rows(rows),
+            DataRows(rows),
             f" (they miss it by {fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, "
             "of a robot with linear guideways",
         )
@@ -104,7 +104,7 @@ def in_frame(
             "swapped columns" if "column" in words else "sign",
             rows,
             f"found {words} in ",
-            Rows(rows),
+            DataRows(rows),
             f" (guideways lie {fitting.off:.3g} m off those of {robot.name} however the frame is placed, {off:.3g} m with "
             "that undone); correct the columns of the measurements",
         )
@@ -113,7 +113,7 @@ def in_frame(
             "another robot",
             rows,
             f"found guideways that lie {fitting.off:.3g} m off those of {robot.name} however the frame is placed, in ",
-            Rows(rows),
+            DataRows(rows),
             f", expected {NEAR:g} m at most; these are measurements of another robot, or its nominal values are wrong: ",
             Given("start", "linear"),
             " needs none",
@@ -148,7 +148,7 @@ def arms_in_frame(
         "another robot",
         rows,
         "found ",
-        Rows(rows),
+        DataRows(rows),
         f" in which links miss their nominal lengths by {missed:.3g} m in the median however the frame is placed, expected "
         f"{NEAR:g} m at most; these are measurements of another robot, or its nominal values are wrong",
     )
@@ -165,7 +165,7 @@ def other_frame(fitting: Fitting, rows: np.ndarray) -> Finding:
         f" is another than that of the nominal values ({_described(fitting)}); identified in the frame measured, from "
         "nominal values moved there"
     )
-    return Finding("frame", rows, ("the frame of ", Rows(rows), words))
+    return Finding("frame", rows, ("the frame of ", DataRows(rows), words))
 
 
 def _described(fitting: Fitting) -> str:
@@ -183,7 +183,7 @@ def not_in_base(robot: NominalRods, fitting: Fitting, rows: np.ndarray) -> Calib
         "frame",
         rows,
         "found ",
-        Rows(rows),
+        DataRows(rows),
         f" in another frame than the base of {robot.name} ({_described(fitting)}), expected poses where the robot is "
         "commanded; move them there, or take ",
         Given("frame", "fitted"),
@@ -231,7 +231,7 @@ def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Find
         advice = (
             f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error",
         )
-    where = Rows(rows, len(found.measurements))
+    where = DataRows(rows, len(found.measurements))
     yield Finding("outliers", rows, (where, f" {agreeing(rows, verb)} {' '.join(words)}; ", *advice))
 
 
@@ -270,7 +270,7 @@ def _misfit(found: FittedRods, seen: Suspicion, findings: list[Finding]) -> Iter
     rows = rows_of(found.rows, found.held_out)
     said: tuple[Part, ...] = (
         f"links miss their lengths by {seen.typical * 1e3:.3g} mm in ",
-        Rows(rows, len(found.measurements)),
+        DataRows(rows, len(found.measurements)),
         " with the best parameters",
     )
     remedy: tuple[Part, ...] = (
@@ -287,7 +287,7 @@ def _in_doubt(found: FittedRods) -> Iterator[Finding]:
     lost = found.held_out[~np.isfinite(found.errors)]
     if lost.size:
         left = f"{agreeing(lost, 'they are')} left out of the error"
-        words = ("links of the calibrated robot do not meet at q of ", Rows(lost), f"; {left}")
+        words = ("links of the calibrated robot do not meet at q of ", DataRows(lost), f"; {left}")
         yield Finding("no pose", lost, words)
 
 
@@ -326,7 +326,7 @@ def _mistaken(found: FittedRods, seen: Suspicion) -> list[Finding]:
     ):
         advice = f"; correct {'this row' if len(indices) == 1 else 'these rows'}"
         findings.append(
-            Finding(mistake.kind, rows[indices], (f"{mistake.words} in ", Rows(rows[indices]), advice))
+            Finding(mistake.kind, rows[indices], (f"{mistake.words} in ", DataRows(rows[indices]), advice))
         )
     if findings and found.loss != "robust":
         words = [part for finding in findings for part in ("; ", *finding.parts)][1:]

@@ -9,7 +9,7 @@ from gantrytau_optimica.calibration.diagnostics.constraint_tension import pulls
 from gantrytau_optimica.calibration.diagnostics.fitted_rods import FittedRods
 from gantrytau_optimica.calibration.diagnostics.outliers import OUTLIER
 from gantrytau_optimica.calibration.diagnostics.row_effects import RowEffect, row_effects
-from gantrytau_optimica.fitting.finding import Finding, Rows, length_text
+from gantrytau_optimica.fitting.finding import DataRows, Finding, length_text
 
 SHOWN = 3  # priors or constraints that are named
 UNIT = 1e-9  # by which a direction of length 1 may be rounded
@@ -48,7 +48,7 @@ def over_rows(found: FittedRods) -> Iterator[Finding]:
 def _of_rows(found: FittedRods, effect: RowEffect, rows: np.ndarray) -> Finding:
     """The finding on an effect in some rows, of all that take part."""
     angle = effect.kind == "turn" or (effect.column >= len(found.nominal_rods.arms))
-    unit, where = "mrad" if angle else "mm", Rows(rows, len(found.measurements))
+    unit, where = "mrad" if angle else "mm", DataRows(rows, len(found.measurements))
     off = f"{effect.change[0] * 1e3:+.3g} {unit}"  # of an actuator
     size = f"{effect.size * 1e3:.3g} {unit} ({', '.join(f'{x * 1e3:+.3g}' for x in effect.change)} {unit})"
     every = f"every {ORDINALS[effect.period]} row, " if effect.period else ""

@@ -19,7 +19,7 @@ from gantrytau_optimica.calibration.links.closure import Chain
 from gantrytau_optimica.calibration.links.error_models import ModelLink, moved
 from gantrytau_optimica.calibration.links.linear_start import linear_start
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
-from gantrytau_optimica.fitting.finding import Rows
+from gantrytau_optimica.fitting.finding import DataRows
 from gantrytau_optimica.fitting.least_squares import least_squares
 
 ROUGH = 1e-3  # m, of links by their linear equations, above which their closure is solved
@@ -50,7 +50,7 @@ def check_robot(
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
             f"found {mistake.words} in ",
-            Rows(rows),
+            DataRows(rows),
             f" (links miss their lengths by {found * 1e3:.3g} mm in the median, {left * 1e3:.3g} mm with that undone); "
             "correct the columns of the measurements",
             kind=mistake.kind,

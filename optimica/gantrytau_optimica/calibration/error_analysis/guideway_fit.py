@@ -9,7 +9,7 @@ from gantrytau.border.checks import array
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import CalibrationError
-from gantrytau_optimica.fitting.finding import Finding, Rows
+from gantrytau_optimica.fitting.finding import DataRows, Finding
 from gantrytau_optimica.fitting.robust import robust_deviations
 
 Array = np.ndarray
@@ -73,7 +73,7 @@ def checked(q: Any, points: Any) -> tuple[Array, Array, Array, list[Finding]]:
     rows, lost = np.flatnonzero(finite), np.flatnonzero(~finite)
     findings = []
     if lost.size:
-        findings.append(Finding("nan", lost, (Rows(lost), " hold no finite numbers and are left out")))
+        findings.append(Finding("nan", lost, (DataRows(lost), " hold no finite numbers and are left out")))
     if len(np.unique(q[rows])) < 2 * (DEGREE + 1):
         raise CalibrationError(
             f"linearity: found {len(np.unique(q[rows]))} different positions of the cart, expected {2 * (DEGREE + 1)} at "
@@ -105,7 +105,7 @@ def _refuse_wrong_numbers(q: Array, points: Array, rows: Array) -> None:
     if np.any(astray) and length > 0:
         raise CalibrationError(
             f"linearity: found points up to {off.max():.3g} m beside a straight line in ",
-            Rows(rows[astray]),
+            DataRows(rows[astray]),
             ", expected those of one guideway; correct them, or leave them out",
             kind="outliers",
             rows=rows[astray],
@@ -277,4 +277,4 @@ def outliers(stray: Array) -> list[Finding]:
     if not stray.size:
         return []
     words = " do not fit the others; measure them again, or leave them out with "
-    return [Finding("outliers", stray, (Rows(stray), words, Given("loss", "robust")))]
+    return [Finding("outliers", stray, (DataRows(stray), words, Given("loss", "robust")))]

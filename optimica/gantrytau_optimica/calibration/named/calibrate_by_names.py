@@ -19,7 +19,7 @@ from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, starte
 from gantrytau_optimica.calibration.fitting.priors import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
+from gantrytau_optimica.fitting.finding import DataRows, Finding, agreeing
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
 
@@ -52,7 +52,7 @@ def usable(
         lost = rows[~there]
         left = f"; {agreeing(lost, 'they are')} left out"
         findings.append(
-            Finding("no pose", lost, ("the nominal robot has no pose at q of ", Rows(lost), left))
+            Finding("no pose", lost, ("the nominal robot has no pose at q of ", DataRows(lost), left))
         )
     return Usable(tool, rows[there], findings)
 
