@@ -74,7 +74,6 @@ EXCEPTIONS = {  # offences that are let pass; this list only shrinks
     "gantrytau_fmu.reading.check_fmu edits a message",
     "gantrytau_fmu.systems.run_fmu edits a message",
     "gantrytau_fmu.systems.ssp.system_description edits a message",
-    "gantrytau_optimica.learning.rig edits a message",
 }
 
 

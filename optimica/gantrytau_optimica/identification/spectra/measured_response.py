@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import check_period
+from gantrytau.border.checks import whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
@@ -49,12 +50,8 @@ def measured_response(u: ArrayLike, y: ArrayLike, *, period: float, blocks: int 
     Resonances narrower than blocks / (N period) Hz are blunted. Raises ModelError for samples that are too few, or none.
     """
     place = "measured_response"
+    whole(place, "blocks", blocks, least=2)
     check_period(place, period)
-    whole = isinstance(blocks, (int, np.integer)) and not isinstance(blocks, bool)
-    if not whole or blocks < 2:
-        raise ModelError(
-            f"{place}: found blocks={blocks!r}, expected a whole number from 2 on", argument="blocks"
-        )
     u, y = sampled_motion(place, u, y, least=SHORTEST * blocks)
     inputs = u.shape[1]
     if blocks < 2 * inputs:
