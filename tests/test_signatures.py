@@ -53,6 +53,16 @@ def wrong_values(hint: Any) -> tuple[Any, ...]:
     return ()
 
 
+def stand_in(hint: Any) -> Any:
+    """What a required argument is given while another is wrong: a number or word where it is one, else any object."""
+    for kind in members(hint):
+        if kind in (int, float):
+            return kind(1)
+        if get_origin(kind) is Literal:
+            return get_args(kind)[0]
+    return object()
+
+
 def checks_itself(kind: type) -> bool:
     """Whether people make objects of a class with arguments of their own: no model, no record that is only returned."""
     made = "__post_init__" if is_dataclass(kind) else "__init__"
@@ -87,7 +97,7 @@ def test_a_wrong_word_or_number_is_refused_by_its_name(path, argument):
     function = getattr(importlib.import_module(door), name)
     parameters = inspect.signature(function).parameters.values()
     required = {
-        p.name: 1 if wrong_values(hints(function)[p.name]) == NO_NUMBERS else object()
+        p.name: stand_in(p.annotation)
         for p in parameters
         if p.default is p.empty and p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)
     }

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Model, ModelError, Result, Samples, linearize, simulate, translate
+from gantrytau.border.checks import array, instance, number, whole
 from gantrytau.border.refusal import StructureError
 from gantrytau.dae import Dae
 from gantrytau.kinematics import Kinematics
@@ -44,11 +45,8 @@ class Rig:
         noise: Scatter | None = None,
         stiff: Model | None = None,
     ):
-        if not (isinstance(period, (int, float)) and 0 < period < np.inf):
-            raise ModelError(f"Rig: found period={period!r}, expected a number above zero, in s")
-        if not isinstance(noise, Scatter | None):
-            raise ModelError(f"Rig: found noise={noise!r}, expected a Scatter, or None for none")
-        self.period = float(period)
+        self.period = number("Rig", "period", period, above=0.0)
+        instance("Rig", "noise", noise, Scatter | None, "a Scatter, or None for none")
         self._stiff = stiff
         self._kinematics: PoseMap | None = None
         self.noise = STILL if noise is None else noise
@@ -56,9 +54,11 @@ class Rig:
         try:
             self.joints = driven_joints(self.robot)
         except ModelError as error:
-            told = str(error).removeprefix("Kinematics: ").partition(";")[0]
             raise ModelError(
-                f"Rig: {told}; make what is driven a component with the input f, and s and v beside it"
+                f"found {self.robot.name} with the inputs {', '.join(self.robot.inputs) or 'none'}, expected forces "
+                "x.f beside x.s and x.v, or torques x.tau beside x.phi and x.w; make what is driven a component x",
+                place="Rig",
+                argument="model",
             ) from error
         self.loop = translate(servo_loop(model, controllers, self.joints), events=True)
         for k in range(len(self.joints)):
@@ -90,14 +90,15 @@ class Rig:
         shape or not finite, InitializationError where the robot cannot rest at the first, SolveError where the simulation
         stops.
         """
-        q_ref = self._reference("position", position)
-        v_ref = np.zeros_like(q_ref) if velocity is None else self._reference("velocity", velocity)
-        if v_ref.shape != q_ref.shape:
+        whole("Rig.run", "seed", seed, least=0)
+        q_ref = array("Rig.run", "position", position, (None, len(self.joints)))
+        if len(q_ref) < 2:
             raise ModelError(
-                f"Rig.run: found velocity of shape {v_ref.shape}, expected that of position, {q_ref.shape}"
+                "found one row of position, expected two at least", place="Rig.run", argument="position"
             )
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise ModelError(f"Rig.run: found seed={seed!r}, expected a whole number, 0 and more")
+        v_ref = (
+            np.zeros_like(q_ref) if velocity is None else array("Rig.run", "velocity", velocity, q_ref.shape)
+        )
         random = np.random.default_rng(seed)
         t = self.period * np.arange(len(q_ref))
         loop, forces = self._at_rest(q_ref[0])
@@ -105,10 +106,14 @@ class Rig:
         # all are samples, so that the equations of one run serve for the next
         series = {"q_ref": q_ref, "v_ref": v_ref, **drawn}
         if "push.f" in self.loop.vectors:
-            series["push.f"] = np.zeros((1, 3)) if push is None else self._force(push, len(t))
+            series["push.f"] = (
+                np.zeros((1, 3)) if push is None else array("Rig.run", "push", push, (len(t), 3))
+            )
         elif push is not None:
             raise ModelError(
-                f"Rig.run: found a push and {self.robot.name}, expected a robot with a tool that has a frame"
+                f"found a push and {self.robot.name}, expected a robot with a tool that has a frame",
+                place="Rig.run",
+                argument="push",
             )
         inputs = {name: Samples(t[: len(u)], u, kind="constant") for name, u in series.items()}
         found = simulate(
@@ -161,9 +166,7 @@ class Rig:
         To be exported as an FMU: `export_fmu(loop, "rig.fmu")`, with q_ref and v_ref as inputs; friction is at its nominal
         level, and nothing pushes. Raises ModelError for another shape, InitializationError where it cannot rest.
         """
-        found = np.asarray(q, dtype=float)
-        if found.shape != (len(self.joints),) or not np.all(np.isfinite(found)):
-            raise ModelError(f"Rig.at_rest: found q={q!r}, expected {len(self.joints)} finite numbers")
+        found = array("Rig.at_rest", "q", q, (len(self.joints),))
         loop, forces = self._at_rest(found)
         still = {name: 0.0 for name in loop.inputs if name.startswith("push.")}
         for law in self._laws:
@@ -171,34 +174,9 @@ class Rig:
                 still |= {f"robot.{law}.level": 1.0, f"robot.{law}.z_0": 0.0}
         return loop, still | {f"controllers[{k}].f_ff": float(force) for k, force in enumerate(forces)}
 
-    def _force(self, push: ArrayLike, rows: int) -> np.ndarray:
-        found = np.asarray(push, dtype=float)
-        if found.shape != (rows, 3) or not np.all(np.isfinite(found)):
-            raise ModelError(
-                f"Rig.run: found push of shape {found.shape}, expected finite forces in N, ({rows}, 3), a row for each of "
-                "position"
-            )
-        return found
-
     def __repr__(self) -> str:
         n = len(self.joints)
         return f"<Rig: {self.robot.name} under {n} servo{'s' * (n > 1)}, every {self.period:g} s>"
-
-    def _reference(self, word: str, values: ArrayLike) -> np.ndarray:
-        try:
-            found = np.asarray(values, dtype=float)
-        except (TypeError, ValueError):
-            raise ModelError(
-                f"Rig.run: found {word}={values!r}, expected numbers in rows of {len(self.joints)}"
-            ) from None
-        if found.ndim != 2 or found.shape[1] != len(self.joints) or len(found) < 2:
-            raise ModelError(
-                f"Rig.run: found {word} of shape {found.shape}, expected (N, {len(self.joints)}), one row for each period"
-            )
-        bad = np.flatnonzero(~np.isfinite(found).all(axis=1))
-        if bad.size:
-            raise ModelError(f"Rig.run: row {bad[0]} of {word} is not finite, expected numbers")
-        return found
 
     @cached_property
     def _sensed(self) -> tuple[str, ...]:

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-
-from gantrytau import ModelError
+from gantrytau.border.checks import number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,12 +22,8 @@ class Scatter:
 
     def __post_init__(self):
         for one in fields(self):
-            value = getattr(self, one.name)
-            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-            bound = 1.0 if one.name in ("level", "rest") else np.inf
-            if not (number and 0 <= value < bound):
-                words = "from 0 to below 1" if bound == 1.0 else "that is finite and not negative"
-                raise ModelError(f"Scatter: found {one.name}={value!r}, expected a number {words}")
+            below = 1.0 if one.name in ("level", "rest") else None
+            number("Scatter", one.name, getattr(self, one.name), least=0.0, below=below)
 
 
 STILL = Scatter(encoder=0.0, gauge=0.0, accelerometer=0.0, level=0.0, rest=0.0)

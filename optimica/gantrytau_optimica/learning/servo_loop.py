@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from gantrytau import Array, Input, Model, ModelError, Real, connect, der
+from gantrytau.border.checks import instance
 from gantrytau.mechanics.multibody import WorldForce
 
 PORTS = ("q_ref", "v_ref", "q", "v", "f_ff", "f")  # of a controller
@@ -72,8 +73,7 @@ def senses(model: Model) -> bool:
 
 def _check(controllers: Sequence[Model], joints: Sequence[str]) -> None:
     n = len(joints)
-    if not isinstance(controllers, Sequence):
-        raise ModelError(f"Rig: found controllers={controllers!r}, expected a list, one for each joint")
+    instance("Rig", "controllers", controllers, Sequence, "a list, one for each joint")
     if len(controllers) != n:
         raise ModelError(
             f"Rig: found {len(controllers)} controllers, expected one for each joint: {', '.join(joints)}"

@@ -2,11 +2,12 @@
 
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau_optimica.vision.opencv import VisionError, opencv
+from gantrytau.border.checks import number, one_of, whole
+from gantrytau_optimica.vision.opencv import opencv
 
 Array = np.ndarray
 BLACK = np.array([[-1, 1], [1, 1], [0, 0], [-1, -1], [1, -1]])  # cells from the middle, x to the right, y up
@@ -23,26 +24,17 @@ class Pattern:
     `Pattern.charuco`. `points` are the corners that detections hold.
     """
 
-    kind: str
+    kind: Literal["quincunx", "charuco"]
     side: float
     _: KW_ONLY
     columns: int = 3
     rows: int = 3
 
     def __post_init__(self):
-        if not (isinstance(self.side, (int, float)) and 0 < self.side < np.inf):
-            raise VisionError(f"Pattern: found side={self.side!r}, expected the side of a cell above 0 in m")
-        if self.side > 1.0:
-            raise VisionError(
-                f"Pattern: found side={self.side!r}, expected at most 1 m; lengths are in m, not mm"
-            )
-        if self.kind not in ("quincunx", "charuco"):
-            raise VisionError(f"Pattern: found kind={self.kind!r}, expected 'quincunx' or 'charuco'")
-        least = 3
-        if not all(isinstance(n, int) and n >= least for n in (self.columns, self.rows)):
-            raise VisionError(
-                f"Pattern: found {self.columns!r} x {self.rows!r} cells, expected whole numbers from {least}"
-            )
+        for name in ("columns", "rows"):
+            whole("Pattern", name, getattr(self, name), least=3)
+        number("Pattern", "side", self.side, above=0.0, most=1.0)  # m, not mm
+        one_of("Pattern", "kind", self.kind, ("quincunx", "charuco"))
 
     @classmethod
     def quincunx(cls, side: float) -> "Pattern":

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gantrytau import Columns, ModelError
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
-from gantrytau_optimica.vision.opencv import VisionError, opencv
+from gantrytau_optimica.vision.opencv import opencv
 
 Array = np.ndarray
 ENDINGS = (".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm")
@@ -19,9 +20,9 @@ def file_name(k: int) -> str:
 
 
 def write_image(path: Path, image: Array) -> None:
-    """Write an image; VisionError where that is not possible."""
+    """Write an image; ModelError where that is not possible."""
     if not opencv().imwrite(str(path), image):
-        raise VisionError(f"{path}: the image cannot be written; check the folder and its rights")
+        raise ModelError(f"{path}: the image cannot be written; check the folder and its rights")
 
 
 def read_image(path: Path) -> Array | None:
@@ -37,18 +38,7 @@ def write_poses(path: str | os.PathLike[str], r: Array, R: Array) -> None:
 
 
 def read_poses(path: str | os.PathLike[str]) -> tuple[Array, Array]:
-    """Poses from a CSV file as of `write_poses`: r (N, 3) in m, R (N, 3, 3); VisionError for other columns."""
-    path = Path(path)
-    if not path.is_file():
-        raise VisionError(f"{path}: there is no such file; check its path")
-    head, *lines = path.read_text(encoding="utf-8-sig").splitlines() or [""]
-    if tuple(name.strip() for name in head.split(",")) != HEADER:
-        raise VisionError(
-            f"{path}: found the columns {head!r}, expected {','.join(HEADER)} in the first line"
-        )
-    try:
-        rows = np.array([[float(cell) for cell in line.split(",")] for line in lines if line.strip()])
-        rows = rows.reshape(-1, len(HEADER))
-    except ValueError as error:
-        raise VisionError(f"{path}: {error}; expected seven numbers in each line") from None
+    """Poses from a CSV file as of `write_poses`: r (N, 3) in m, R (N, 3, 3); ModelError for other columns."""
+    table = Columns.read(path, "one line for each pose")
+    rows = np.column_stack([table.column(x, "m" if x in "xyz" else "1", filled=True) for x in HEADER])
     return rows[:, :3], of_quaternions(rows[:, 3:])

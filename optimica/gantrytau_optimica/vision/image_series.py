@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau_optimica.vision.image_files import ENDINGS, read_image
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 SCALE = {np.dtype(np.uint8): 1.0, np.dtype(np.uint16): 255 / 65535}
@@ -36,7 +36,7 @@ class ImageSeries:
 
 
 def image_series(images: Any, name: str) -> ImageSeries:
-    """The images of a folder or an array; VisionError for what is neither, has none, or images of several sizes."""
+    """The images of a folder or an array; ModelError for what is neither, has none, or images of several sizes."""
     if isinstance(images, (str, os.PathLike)):
         return _of_folder(Path(images))
     if isinstance(images, Sequence) and all(isinstance(image, np.ndarray) for image in images):
@@ -44,7 +44,7 @@ def image_series(images: Any, name: str) -> ImageSeries:
     if isinstance(images, np.ndarray):
         colour = images.ndim == 3 and images.shape[-1] in (3, 4) and images.shape[1] > 4
         return _of_arrays([images] if images.ndim == 2 or colour else list(images), name)
-    raise VisionError(
+    raise ModelError(
         f"detect: {name}: found {type(images).__name__}, expected a folder of images or an array (N, height, width)"
     )
 
@@ -52,11 +52,11 @@ def image_series(images: Any, name: str) -> ImageSeries:
 def rows_of(cameras: Sequence[ImageSeries]) -> tuple[int, ...]:
     """The numbers of images over all cameras, one for each row: also those that all cameras lack between others.
 
-    Files are paired by the last number in their names. VisionError where images without one differ in number.
+    Files are paired by the last number in their names. ModelError where images without one differ in number.
     """
     counts = [len(series.numbers) for series in cameras]
     if len(set(counts)) > 1 and not all(series.numbered for series in cameras):
-        raise VisionError(
+        raise ModelError(
             f"detect: found {' and '.join(map(str, counts))} images, expected as many of each camera, pose by pose; folders "
             "whose files have numbers in their names may lack some"
         )
@@ -69,19 +69,19 @@ def rows_of(cameras: Sequence[ImageSeries]) -> tuple[int, ...]:
 
 def _of_folder(folder: Path) -> ImageSeries:
     if not folder.is_dir():
-        raise VisionError(f"{folder}: there is no such folder; check its path")
+        raise ModelError(f"{folder}: there is no such folder; check its path")
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in ENDINGS)
     if not files:
-        raise VisionError(f"{folder}: found no images, expected files ending in {', '.join(ENDINGS)}")
+        raise ModelError(f"{folder}: found no images, expected files ending in {', '.join(ENDINGS)}")
     found = [_NUMBER.search(file.stem) for file in files]
     numbers = [int(match[1]) if match else k for k, match in enumerate(found)]
     if any(found) and not all(found):
         bare = next(file for file, match in zip(files, found, strict=True) if not match)
-        raise VisionError(f"{bare}: found no number in its name, others have one; rename it or move it away")
+        raise ModelError(f"{bare}: found no number in its name, others have one; rename it or move it away")
     paths: dict[int, Path] = {}
     for file, number in zip(files, numbers, strict=True):
         if number in paths:
-            raise VisionError(
+            raise ModelError(
                 f"{file}: has the number {number}, as {paths[number].name}; images of cameras are paired by the "
                 "last number in their names, rename one"
             )
@@ -95,13 +95,13 @@ def _of_folder(folder: Path) -> ImageSeries:
 
     first = next((image for number in sorted(paths) if (image := load(number)) is not None), None)
     if first is None:
-        raise VisionError(f"{folder}: none of {len(files)} images can be read; write them anew")
+        raise ModelError(f"{folder}: none of {len(files)} images can be read; write them anew")
     return ImageSeries(str(folder), tuple(sorted(paths)), load, size[0], all(found))
 
 
 def _of_arrays(images: list[Array], name: str) -> ImageSeries:
     if not images:
-        raise VisionError(f"detect: {name}: found no images, expected an array (N, height, width)")
+        raise ModelError(f"detect: {name}: found no images, expected an array (N, height, width)")
     size: list[tuple[int, int]] = []
 
     def load(k: int) -> Array | None:
@@ -116,7 +116,7 @@ def _of_size(image: Array, size: list[tuple[int, int]], place: str) -> Array:
     values = grey_of(image, place)
     found = (values.shape[1], values.shape[0])
     if size and size[0] != found:
-        raise VisionError(
+        raise ModelError(
             f"{place}: found {found[0]} x {found[1]} pixels, expected {size[0][0]} x {size[0][1]} as of the images before; "
             "one camera has one size"
         )
@@ -127,7 +127,7 @@ def _of_size(image: Array, size: list[tuple[int, int]], place: str) -> Array:
 def grey_of(image: Array, place: str) -> Array:
     """Grey values from 0 to 255, float32, of an image of 8 or 16 bits, grey or blue, green, red and perhaps opacity."""
     if image.dtype not in SCALE:
-        raise VisionError(
+        raise ModelError(
             f"{place}: found numbers of type {image.dtype}, expected images of 8 or 16 bits, uint8 or uint16"
         )
     if image.ndim == 3 and image.shape[2] in (3, 4):
@@ -135,10 +135,10 @@ def grey_of(image: Array, place: str) -> Array:
     elif image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 1):
         values = image.reshape(image.shape[:2]).astype(np.float32)
     else:
-        raise VisionError(
+        raise ModelError(
             f"{place}: found an image of shape {image.shape}, expected (height, width) or (height, width, 3)"
         )
     height, width = image.shape[:2]
     if min(height, width) < 16:
-        raise VisionError(f"{place}: found {width} x {height} pixels, expected at least 16 x 16")
+        raise ModelError(f"{place}: found {width} x {height} pixels, expected at least 16 x 16")
     return values * np.float32(SCALE[image.dtype])

@@ -7,20 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import read_toml
+from gantrytau import ModelError, read_toml
+from gantrytau.border.checks import array
+from gantrytau.border.refusal import Given
 from gantrytau.border.schema import Value, read_table
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import UP
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
-from gantrytau_optimica.calibration.devices.devices import numbers
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 LENS = 5  # k1, k2, p1, p2, k3
 NEWTON = 20  # steps from an image point to its direction; four are enough for usual lenses
 SETTLED = 1e-12  # of x and y at depth 1: 1e-9 pixel
 KEYS = {
-    "K": Value("pixel", ((3, 3),)),
+    "K": Value("1", ((3, 3),)),
     "distortion": Value("1", ((LENS,),)),
     "size": Value("whole", ((2,),), least=1),
 }
@@ -32,7 +32,7 @@ class Camera(Record):
 
     K: ((f_x, 0, c_x), (0, f_y, c_y), (0, 0, 1)) in pixels, the middle of the first pixel at (0, 0); distortion: k1, k2,
     p1, p2, k3 of Brown and Conrady, as of OpenCV; size: (width, height) in pixels.
-    Raises VisionError for other shapes, a skew, focal lengths that are not above zero and a centre off the sensor.
+    Raises ModelError for other shapes, a skew, focal lengths that are not above zero and a centre off the sensor.
     """
 
     K: Any
@@ -40,28 +40,25 @@ class Camera(Record):
     size: Any = (1024, 768)
 
     def __post_init__(self):
-        K, lens, size = numbers(self.K), numbers(self.distortion), numbers(self.size)
-        if size.shape != (2,) or not np.all((size >= 1) & (size == np.round(size))):
-            raise VisionError(
-                f"Camera: found size={self.size!r}, expected (width, height), whole pixels above 0"
-            )
-        if K.shape != (3, 3) or not np.all(np.isfinite(K)):
-            raise VisionError(f"Camera: found K={self.K!r}, expected (3, 3) finite numbers in pixels")
-        if np.any(K[[0, 1, 2, 2, 2], [1, 0, 0, 1, 2]] != [0, 0, 0, 0, 1]):
-            raise VisionError(
-                f"Camera: found K={K.tolist()}, expected ((f_x, 0, c_x), (0, f_y, c_y), (0, 0, 1)); a skew is not modelled"
-            )
+        size = array("Camera", "size", self.size, (2,))
+        K = array("Camera", "K", self.K, (3, 3))
+        lens = array("Camera", "distortion", self.distortion, (LENS,))
+        if not np.all((size >= 1) & (size == np.round(size))):
+            wrong = Given("size", self.size)
+            raise ModelError("expected (width, height), whole pixels above 0", place="Camera", found=wrong)
         focal, centre = np.diag(K)[:2], K[:2, 2]
-        if not np.all(focal > 0):
-            raise VisionError(f"Camera: found focal lengths {focal.tolist()}, expected pixels above 0")
-        if not np.all((centre > -0.5) & (centre < size - 0.5)):
-            raise VisionError(
-                f"Camera: found the centre {centre.tolist()} outside of an image of {size[0]:g} x {size[1]:g}, expected "
-                "K and size of the same images; scale K with them"
+        if np.any(K[[0, 1, 2, 2, 2], [1, 0, 0, 1, 2]] != [0, 0, 0, 0, 1]) or not np.all(focal > 0):
+            raise ModelError(
+                "expected ((f_x, 0, c_x), (0, f_y, c_y), (0, 0, 1)), f in pixels above 0; a skew is not modelled",
+                place="Camera",
+                found=Given("K", self.K),
             )
-        if lens.shape != (LENS,) or not np.all(np.isfinite(lens)):
-            raise VisionError(
-                f"Camera: found distortion={self.distortion!r}, expected k1, k2, p1, p2, k3; put zeros for what is not known"
+        if not np.all((centre > -0.5) & (centre < size - 0.5)):
+            raise ModelError(
+                f"found the centre {centre.tolist()} outside of an image of {size[0]:g} x {size[1]:g}, expected "
+                "K and size of the same images; scale K with them",
+                place="Camera",
+                argument="K",
             )
         for name, value in (("K", K), ("distortion", lens), ("size", tuple(int(n) for n in size))):
             object.__setattr__(self, name, value)
@@ -75,7 +72,7 @@ class Camera(Record):
     @classmethod
     def guess(cls, size: Any, focal: float) -> "Camera":
         """A camera with square pixels, its centre in the middle and no distortion: size (width, height), focal in pixels."""
-        width, height = numbers(size) if numbers(size).shape == (2,) else (np.nan, np.nan)
+        width, height = array("Camera.guess", "size", size, (2,))
         return cls([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]], size=size)
 
     def write(self, toml: str | os.PathLike[str]) -> None:

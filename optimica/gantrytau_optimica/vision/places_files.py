@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau.border.columns import Columns
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 PLACE = ("x", "y", "z")
@@ -24,16 +24,16 @@ def read_places(path: Path) -> tuple[Array, Array | None]:
 def paired(places: Path, reference: Path) -> tuple[Array, Array]:
     """Places of two files, of the same poses in each row, (N, 3) in m: by `number`, or row by row.
 
-    Raises VisionError where they have none in common, or not as many.
+    Raises ModelError where they have none in common, or not as many.
     """
     (r, first), (others, second) = read_places(places), read_places(reference)
     if first is not None and second is not None:
         common, rows, of_reference = np.intersect1d(first, second, return_indices=True)
         if not common.size:
-            raise VisionError(f"{reference}: found none of the numbers of {places}, expected the same poses")
+            raise ModelError(f"{reference}: found none of the numbers of {places}, expected the same poses")
         return r[rows], others[of_reference]
     if len(r) != len(others):
-        raise VisionError(
+        raise ModelError(
             f"{reference}: found {len(others)} rows, expected {len(r)} as in {places}; a column `number` in both pairs them"
         )
     return r, others
@@ -43,7 +43,7 @@ def read_carts(path: Path, numbers: Any) -> Array:
     """Positions (N, n) of the carts in m from a CSV file with q1, q2, ..., a row for each image.
 
     numbers: of the images (N,), by which rows are chosen where the file has a column `number`. Raises ModelError for
-    columns and VisionError for rows that are missing.
+    columns and rows that are missing.
     """
     table = Columns.read(path)
     joints = [name for name in (f"q{k}" for k in range(2, 13)) if name in table]
@@ -53,13 +53,13 @@ def read_carts(path: Path, numbers: Any) -> Array:
         places = {int(number): k for k, number in enumerate(of_images) if np.isfinite(number)}
         missing = [int(number) for number in numbers if int(number) not in places]
         if missing:
-            raise VisionError(
+            raise ModelError(
                 f"{path}: found no row with the number {missing[0]}, expected one for each image; "
                 f"{len(missing)} are missing"
             )
         return q[[places[int(number)] for number in numbers]]
     if len(q) != len(numbers):
-        raise VisionError(
+        raise ModelError(
             f"{path}: found {len(q)} rows for images of {len(numbers)} poses, expected as many; a column "
             "`number` tells which row is which image"
         )

@@ -12,6 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import check_words, number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.assessment.calibration_acceptance import CalibrationVerdict
 from gantrytau_optimica.calibration.assessment.cross_validation import cross_validate
@@ -27,7 +29,6 @@ from gantrytau_optimica.vision.comparison.compare import Comparison, compare
 from gantrytau_optimica.vision.detection.detect import detect
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
-from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.reconstruct import reconstruct
 from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstruction
 from gantrytau_optimica.vision.scenes.render import Images, render
@@ -85,13 +86,18 @@ def rehearse_plan(
 
     side: of a cell of the quincunx on the tool, m; intrinsics: as of `reconstruct`; light, seed: of the images, and of the
     robot that stands there; progress: told what is done. Images and `measurements.csv` are kept in the folder rehearsal of
-    the plan. Raises VisionError for a plan for another device, and all errors of its steps.
+    the plan. Raises ModelError for a plan for another device, and all errors of its steps.
     """
+    check_words(rehearse_plan, locals())
+    number("rehearse_plan", "side", side, above=0.0)
+    whole("rehearse_plan", "seed", seed, least=0)
     device = planned.cell.device
     if not isinstance(device, Cameras):
-        raise VisionError(
-            f'rehearse_plan: found a plan for {type(device).__name__}, expected cameras; set kind = "stereo cameras" in '
-            "[device] and plan anew"
+        raise ModelError(
+            f'found a plan for {type(device).__name__}, expected cameras; set kind = "stereo cameras" in [device] and '
+            "plan anew",
+            place="rehearse_plan",
+            argument="planned",
         )
     tell = progress or (lambda words: None)
     plan = planned.plan

@@ -59,8 +59,8 @@ def test_what_is_wrong_with_a_log_is_told_with_its_file(run, log, tmp_path):
     ("arguments", "words", "code"),
     [
         (("--friction", "dry"), "--friction dry: found an unknown law", 2),
-        (("--minimum-speed=-1",), "--minimum-speed -1.0: expected a speed in m/s", 2),
-        (("--cutoff", "0"), "--cutoff 0.0: expected a frequency in Hz above 0", 2),
+        (("--minimum-speed=-1",), "--minimum-speed -1.0: expected a number of at least 0", 2),
+        (("--cutoff", "0"), "--cutoff 0.0: expected a number above 0", 2),
         (("--fixed", "link_masses"), "expected a number, as --fixed link_masses=0", 2),
         (("--fixed", "link_mass=0"), "link_mass", 1),
     ],

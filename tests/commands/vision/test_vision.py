@@ -78,7 +78,7 @@ def test_images_become_corners_and_a_page(run, tmp_path, monkeypatch):
     ("words", "told"),
     [
         (("vision", "detect", "nowhere", "--side", "0.06"), "nowhere: there is no such folder"),
-        (("vision", "detect", ".", "--side", "60"), "expected at most 1 m; lengths are in m, not mm"),
+        (("vision", "detect", ".", "--side", "60"), "a number above 0 and of at most 1"),
         (RECONSTRUCT[:5], "found 1 cameras and images of 2, expected one lens for each"),
         ((*RECONSTRUCT, "--scale", "both"), "both"),
         ((*RECONSTRUCT, "--place", "1,2"), "--place 1,2: found no three numbers"),

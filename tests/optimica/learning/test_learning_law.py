@@ -1,7 +1,5 @@
 """Laws of learning control against their lifted form, and the numbers of Dressler (2012), section 7.2."""
 
-from typing import Any, cast
-
 import numpy as np
 import pytest
 from scipy.linalg import block_diag, toeplitz
@@ -11,7 +9,7 @@ from scipy.signal.windows import tukey
 from gantrytau import ModelError, StateSpace
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
-from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal, Shifted
+from gantrytau_optimica.learning.laws.correction_laws import Gradient, NormOptimal
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.laws.lifted import lifted
 
@@ -130,20 +128,16 @@ def test_filters_shift_nothing_and_have_their_gain():
     [
         (lambda: Tukey(1.2, 4.5).weights(900, PERIOD), r"window from 1\.2 to 4\.5 s, expected one within the run of 3\.6 s"),
         (lambda: Tukey(lead=2.0).weights(900, PERIOD), "flanks of 2 s in a window of 3.6 s"),
-        (lambda: Tukey(alpha=2.0).weights(900, PERIOD), "found alpha=2.0"),
-        (lambda: ZeroPhase.butterworth(0, 10.0), "found order=0"),
-        (lambda: ZeroPhase.butterworth(2, -1.0), "found hz=.*-1.0.*, expected a frequency above zero"),
+        (lambda: ZeroPhase.butterworth(2, -1.0), "found hz=-1.0, expected frequencies above zero"),
         (lambda: ZeroPhase.butterworth(2, 130.0).apply(np.zeros(9), PERIOD), "130 Hz beside samples every 0.004 s"),
         (lambda: ZeroPhase.butterworth(2, [1.0, 2.0]).apply(np.zeros((9, 3)), PERIOD), "filters for 2 axes and 3 signals"),
         (lambda: ZeroPhase.butterworth(2, 10.0).notched(7.0, 0.0, 0.5), "found width=0.0"),
-        (lambda: Shifted(0.9, -1), "found gain=0.9, shift=-1"),
-        (lambda: Learning(shift=cast(Any, 2.5)), "shift=2.5"),
+        (lambda: Learning(shift=-1), "found shift=-1"),
         (lambda: Learning().next(np.zeros((9, 2)), np.zeros((8, 2)), PERIOD), r"\(9, 2\) and errors of shape \(8, 2\)"),
         (lambda: Learning().next(np.zeros((9, 1)), np.full((9, 1), np.nan), PERIOD), "not finite, first at 0 s"),
         (lambda: Learning().stability([servo(*PRINTED[0]), coupled()], 300), "one of each axis"),
         (lambda: Learning().stability(StateSpace([[-1.0]], [1], [1], 0), 300), r"periods of none \(continuous\)"),
         (lambda: Learning(law=Gradient(coupled())).stability(servo(*PRINTED[0]), 300), "model of 2 axes and errors of 1"),
-        (lambda: Learning(law=NormOptimal(coupled(), weight=0.0)).stability(coupled(), 300), "found weight=0.0"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused(call, words):

@@ -156,12 +156,6 @@ def wrong(words: str):
 def test_wrong_rigs_are_told(start):
     robot = FlexibleGantryTau(RECORD, friction=None)
     servos = cart_servos(RECORD)
-    with wrong("Rig: found period=0, expected a number above zero, in s"):
-        Rig(robot, servos, period=0)
-    with wrong("Rig: found noise=1e-06, expected a Scatter, or None for none"):
-        Rig(robot, servos, period=0.004, noise=1e-6)  # pyright: ignore[reportArgumentType]
-    with wrong("Rig: found controllers=None, expected a list, one for each joint"):
-        Rig(robot, None, period=0.004)  # pyright: ignore[reportArgumentType]
     with wrong("Rig: found 2 controllers, expected one for each joint: carts[0].s, carts[1].s, carts[2].s"):
         Rig(robot, servos[:2], period=0.004)
     with wrong(
@@ -190,25 +184,20 @@ def test_servos_of_another_period_are_told(start):
 
 def test_wrong_references_are_told(rubbed, start):
     reference = np.tile(start, (10, 1))
-    with wrong("Rig.run: found position of shape (10, 2), expected (N, 3), one row for each period"):
-        rubbed.run(reference[:, :2])
-    with wrong("Rig.run: found position of shape (3,), expected (N, 3)"):
-        rubbed.run(start)
-    with wrong("Rig.run: found velocity of shape (9, 3), expected that of position, (10, 3)"):
-        rubbed.run(reference, reference[:9])
-    with wrong("Rig.run: found position='here', expected numbers in rows of 3"):
-        rubbed.run("here")
-    for seed in (-1, 1.5, None, True):
-        with wrong(f"Rig.run: found seed={seed!r}, expected a whole number, 0 and more"):
-            rubbed.run(reference, seed=seed)
-    reference[4, 1] = np.nan
-    with wrong("Rig.run: row 4 of position is not finite, expected numbers"):
-        rubbed.run(reference)
+    for argument, call in (
+        ("position", lambda: rubbed.run(reference[:, :2])),
+        ("position", lambda: rubbed.run(reference[:1])),
+        ("velocity", lambda: rubbed.run(reference, reference[:9])),
+        ("push", lambda: rubbed.run(reference, push=reference[:9])),
+        ("q", lambda: rubbed.at_rest(reference[:2])),
+    ):
+        with pytest.raises(ModelError) as refusal:
+            call()
+        assert refusal.value.argument == argument
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("gauge", -1e-6), ("encoder", np.nan), ("level", 1.0), ("rest", "much")]
-)
-def test_wrong_scatter_is_told(name, value):
-    with wrong(f"Scatter: found {name}={value!r}, expected a number"):
+@pytest.mark.parametrize(("name", "value"), [("gauge", -1e-6), ("level", 1.0)])
+def test_scatter_keeps_its_limits(name, value):
+    with pytest.raises(ModelError) as refusal:
         Scatter(**{name: value})
+    assert refusal.value.argument == name

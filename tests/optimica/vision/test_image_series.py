@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from gantrytau_optimica.vision import Pattern, VisionError, detect, render
+from gantrytau import ModelError
+from gantrytau_optimica.vision import Pattern, detect, render
 from tests.optimica.vision.camera_rig import SIDE, pair, places, scene
 
 cv2 = pytest.importorskip("cv2")
@@ -38,24 +39,24 @@ def test_files_without_numbers_are_paired_in_order_if_they_are_as_many(folders):
             file.rename(folder / f"{letter}.png")
     assert detect(folders, QUINCUNX, background=0).pairs.all()
     (folders[0] / "b.png").unlink()
-    with pytest.raises(VisionError, match="found 3 and 4 images, expected as many of each camera"):
+    with pytest.raises(ModelError, match="found 3 and 4 images, expected as many of each camera"):
         detect(folders, QUINCUNX)
     (folders[0] / "7.png").write_bytes((folders[0] / "a.png").read_bytes())
-    with pytest.raises(VisionError, match=r"a.png: found no number in its name, others have one"):
+    with pytest.raises(ModelError, match=r"a.png: found no number in its name, others have one"):
         detect(folders, QUINCUNX)
 
 
 def test_two_files_of_one_number_are_refused(folders):
     (folders[0] / "again1.png").write_bytes((folders[0] / "0001.png").read_bytes())
-    with pytest.raises(VisionError, match=r"again1.png: has the number 1, as 0001.png"):
+    with pytest.raises(ModelError, match=r"again1.png: has the number 1, as 0001.png"):
         detect(folders, QUINCUNX)
 
 
 def test_folders_that_hold_nothing_are_refused(tmp_path):
-    with pytest.raises(VisionError, match="there is no such folder"):
+    with pytest.raises(ModelError, match="there is no such folder"):
         detect([tmp_path / "left"], QUINCUNX)
-    with pytest.raises(VisionError, match="found no images, expected files ending in"):
+    with pytest.raises(ModelError, match="found no images, expected files ending in"):
         detect([tmp_path], QUINCUNX)
     (tmp_path / "1.png").write_bytes(b"")
-    with pytest.raises(VisionError, match="none of 1 images can be read"):
+    with pytest.raises(ModelError, match="none of 1 images can be read"):
         detect([tmp_path], QUINCUNX)

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import LaserTracker, Measurements, load_planned_cell, plan_cell, read_cell
-from gantrytau_optimica.vision import VisionError, rehearse_plan
+from gantrytau_optimica.vision import rehearse_plan
 
 CELL = """\
 [robot]
@@ -74,5 +75,5 @@ def test_lenses_as_believed_leave_the_error_of_the_device(planned):
 
 def test_plans_for_another_device_are_refused(planned):
     other = replace(planned, cell=replace(planned.cell, device=LaserTracker((4.5, 2.9, -0.7))))
-    with pytest.raises(VisionError, match='for LaserTracker, expected cameras; set kind = "stereo cameras"'):
+    with pytest.raises(ModelError, match='for LaserTracker, expected cameras; set kind = "stereo cameras"'):
         rehearse_plan(other)

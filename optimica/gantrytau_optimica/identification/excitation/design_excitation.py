@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from gantrytau import Model, ModelError, SolveError, translate
+from gantrytau.border.checks import check_words, number, whole
 from gantrytau_optimica.identification.excitation.excitation_limits import ExcitationLimits, excitation_limits
 from gantrytau_optimica.identification.excitation.excitation_program import Criterion, ExcitationProgram
 from gantrytau_optimica.identification.excitation.excitation_result import Excitation, deviations
@@ -46,8 +47,12 @@ def design_excitation(
     confidence ellipsoid; "condition", a smooth bound of the condition number. The best of `starts` random starts.
     Raises ModelError for what does not fit, SolveError where no motion keeps the limits. Swevers et al. (1997).
     """
-    times = dict(duration=duration) | ({} if period is None else dict(period=period))
-    _check(times, dict(harmonics=harmonics, starts=starts), criterion)
+    check_words(design_excitation, locals())
+    for name, value in dict(duration=duration, period=period).items():
+        if value is not None:
+            number("design_excitation", name, value, above=PERIOD)
+    for name, value, least in (("harmonics", harmonics, 2), ("starts", starts, 1), ("seed", seed, 0)):
+        whole("design_excitation", name, value, least=least)
     dae = translate(robot)
     if TOOL[0] not in dae.variables:
         raise ModelError(
@@ -103,27 +108,6 @@ def _best(
             "forces hold the robot at rest in the whole box, and whether it is within reach"
         )
     return min(kept, key=lambda each: each[0])[1:]
-
-
-def _check(times: Mapping[str, float], counts: Mapping[str, int], criterion: str) -> None:
-    for name, value in times.items():
-        if not (np.ndim(value) == 0 and np.isfinite(value) and value > PERIOD):
-            raise ModelError(
-                f"design_excitation: found {name}={value!r}, expected a number above {PERIOD} in s",
-                argument=name,
-            )
-    for name, value in counts.items():
-        least = 2 if name == "harmonics" else 1
-        if not isinstance(value, (int, np.integer)) or value < least:
-            raise ModelError(
-                f"design_excitation: found {name}={value!r}, expected a whole number, {least} at least",
-                argument=name,
-            )
-    if criterion not in get_args(Criterion):
-        raise ModelError(
-            f"design_excitation: found criterion={criterion!r}, expected one of {', '.join(get_args(Criterion))}",
-            argument="criterion",
-        )
 
 
 def _begins(limits: ExcitationLimits, harmonics: int, seed: int, starts: int) -> list[np.ndarray]:

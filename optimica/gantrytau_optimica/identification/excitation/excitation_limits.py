@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array
 
 SIZES = ("speed", "acceleration", "force")
 
@@ -41,18 +42,19 @@ def excitation_limits(limits: Mapping[str, Any], actuators: int, coordinates: in
         )
     sizes = []
     for name in SIZES:
-        value = np.asarray(limits[name], dtype=float)
-        if value.shape not in ((), (actuators,)) or not np.all((value > 0) & np.isfinite(value)):
+        value = array("design_excitation", "limits", limits[name], (), (actuators,))
+        if not np.all(value > 0):
             raise ModelError(
-                f"design_excitation: found limit {name}={limits[name]!r}, expected a number above 0 or {actuators} of them",
+                f"found limit {name}={limits[name]!r}, expected a number above 0 or {actuators} of them",
+                place="design_excitation",
                 argument="limits",
             )
         sizes.append(np.broadcast_to(value, actuators))
-    box = np.asarray(limits["box"], dtype=float)
-    if box.shape != (2, coordinates) or not np.all(box[0] < box[1]) or not np.all(np.isfinite(box)):
+    box = array("design_excitation", "limits", limits["box"], (2, coordinates))
+    if not np.all(box[0] < box[1]):
         raise ModelError(
-            f"design_excitation: found limit box={limits['box']!r}, expected two corners of {coordinates} numbers in m, the "
-            "lower first",
+            "found a box without extent, expected the lower corner first",
+            place="design_excitation",
             argument="limits",
         )
     return ExcitationLimits(*sizes, *box)

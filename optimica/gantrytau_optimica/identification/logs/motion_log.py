@@ -9,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import Columns, Model, ModelError, Result, translate
+from gantrytau.border.checks import array, number, whole
 from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
@@ -38,18 +39,13 @@ class MotionLog(Record):
 
     def __post_init__(self):
         for name in ("t", "q", "f", "v", "r"):
-            array = getattr(self, name)
-            object.__setattr__(self, name, None if array is None else rows_of("MotionLog", name, array))
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, rows_of("MotionLog", name, values))
         rows, actuators = len(self.t), self.q.shape[1]
-        expected = {"t": (rows,), "q": (rows, actuators), "f": (rows, actuators), "v": (rows, actuators)}
-        for name, shape in (expected | {"r": (rows, 3)}).items():
-            array = getattr(self, name)
-            if array is not None and array.shape != shape:
-                raise ModelError(
-                    f"MotionLog: found {name} of shape {array.shape} beside t of shape {self.t.shape} and q of shape "
-                    f"{self.q.shape}, expected {shape}: one row for each time, one column for each actuator",
-                    argument=name,
-                )
+        for name, columns in (("q", actuators), ("f", actuators), ("v", actuators), ("r", 3)):
+            if getattr(self, name) is not None:
+                array("MotionLog", name, getattr(self, name), (rows, columns), finite=False)
 
     @classmethod
     def read(cls, path: str | Path) -> Self:
@@ -87,11 +83,10 @@ class MotionLog(Record):
         that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a
         period that is not above 0, and for a result with outputs farther apart than that.
         """
-        if not (0 < period < np.inf and encoder >= 0 and force >= 0):
-            raise ModelError(
-                f"MotionLog.of: found period={period!r}, encoder={encoder!r}, force={force!r}, expected a time above 0 and "
-                "deviations of at least 0"
-            )
+        number("MotionLog.of", "period", period, above=0.0)
+        for name, value in dict(encoder=encoder, force=force).items():
+            number("MotionLog.of", name, value, least=0.0)
+        whole("MotionLog.of", "seed", seed, least=0)
         joints = driven_joints(robot if isinstance(robot, Dae) else translate(robot, units=False))
         drives = [f"{name[:-2]}.f" if name.endswith(".s") else f"{name[:-4]}.tau" for name in joints]
         t = instants(result, 1 / period)
@@ -124,7 +119,7 @@ class MotionLog(Record):
         if isinstance(rows, (int, np.integer)):
             rows = slice(rows, rows + 1 or None)
         arrays = (self.t, self.q, self.f, self.v, self.r)
-        return type(self)(*(None if array is None else array[rows] for array in arrays))
+        return type(self)(*(None if one is None else one[rows] for one in arrays))
 
     def between(self, start: float, stop: float) -> Self:
         """The rows from start to stop, both in s and included."""
@@ -138,8 +133,8 @@ class MotionLog(Record):
     @property
     def finite(self) -> np.ndarray:
         """Which rows hold numbers only, (N,)."""
-        arrays = [array for array in (self.t[:, None], self.q, self.f, self.v, self.r) if array is not None]
-        return np.logical_and.reduce([np.isfinite(array).all(axis=1) for array in arrays])
+        arrays = [one for one in (self.t[:, None], self.q, self.f, self.v, self.r) if one is not None]
+        return np.logical_and.reduce([np.isfinite(one).all(axis=1) for one in arrays])
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:

@@ -5,6 +5,7 @@ T = [C; C A],  T A T^-1 = [[0, 1], [-M^-1 K, -M^-1 D]],  C B = 0,  C A B = M^-1
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau_optimica.identification.physical.mechanical_form import MechanicalForm
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
@@ -20,17 +21,20 @@ def continuous_of(system: LinearSystem) -> LinearSystem:
     order, outputs, inputs = len(system.A), len(system.C), system.B.shape[1]
     name = f"physical_form of {system.title}"
     if outputs != inputs or not outputs:
-        raise IdentificationError(
-            f"{name}: found {outputs} outputs and {inputs} inputs, expected as many: forces, and positions along them; "
-            "identify a model with these alone"
+        raise ModelError(
+            f"found {outputs} outputs and {inputs} inputs, expected as many: forces, and positions along them; "
+            "identify a model with these alone",
+            place=name,
+            argument="system",
         )
     if order != 2 * outputs:
         remedy = f"identify a model of order {2 * outputs}" + (
             f", or with {order // 2} positions and forces" if order % 2 == 0 and order else ""
         )
-        raise IdentificationError(
-            f"{name}: found order {order} with {outputs} positions, expected {2 * outputs}, a position and a speed each; "
-            + remedy
+        raise ModelError(
+            f"found order {order} with {outputs} positions, expected {2 * outputs}, a position and a speed each; {remedy}",
+            place=name,
+            argument="system",
         )
     poles = system.poles
     edge = np.real(poles).max() if system.period is None else np.abs(poles).max() - 1

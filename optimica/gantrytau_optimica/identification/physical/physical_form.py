@@ -48,8 +48,8 @@ def physical_form(
     structured: from there on fit M = S S', K = S S' and a symmetric D to the response of the system. measured: fit (u, y)
     instead, forces and positions (N, n) each at the period of the system: only these show modes that the system lacks.
     Both routes are compared: what is indefinite, not symmetric or not explained stands in `.findings`.
-    Raises IdentificationError for another order, unstable systems and outputs that are no positions, ModelError for poles
-    that no continuous system has. Dressler (2012), (6.14) and (6.15).
+    Raises ModelError for another order and for poles that no continuous system has, IdentificationError for unstable
+    systems and outputs that are no positions. Dressler (2012), (6.14) and (6.15).
     """
     name = f"physical_form of {system.title}"
     continuous = continuous_of(system)

@@ -18,23 +18,9 @@ from gantrytau_optimica.identification.rigid.robot_dynamics import (
     public_name,
 )
 
-LAWS = ("symmetric", "asymmetric", "stribeck", None)
 
-
-def check_call(
-    dae: Dae, logs: Sequence[MotionLog], coordinates: Sequence[str], friction: Any, minimum_speed: float
-) -> None:
-    """ModelError for what no call can mean."""
-    if friction not in LAWS:
-        raise ModelError(
-            f"identify: found friction={friction!r}, expected one of {', '.join(map(repr, LAWS))}",
-            argument="friction",
-        )
-    if not 0 <= minimum_speed < np.inf:
-        raise ModelError(
-            f"identify: found minimum_speed={minimum_speed!r}, expected a speed in m/s, not negative",
-            argument="minimum_speed",
-        )
+def check_logs(dae: Dae, logs: Sequence[MotionLog], coordinates: Sequence[str]) -> None:
+    """ModelError unless there are logs of all drives of the robot."""
     if not logs:
         raise ModelError("identify: found no log, expected one or more; give a MotionLog")
     for number, log in enumerate(logs):

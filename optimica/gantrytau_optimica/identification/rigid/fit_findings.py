@@ -29,10 +29,6 @@ def usable_parts(
     """
     kept: list[tuple[tuple[int, np.ndarray], MotionLog]] = []
     findings: list[Finding] = []
-    if not 0 < cutoff < np.inf:
-        raise IdentificationError(
-            f"identify: found cutoff={cutoff!r}, expected a frequency in Hz above 0", argument="cutoff"
-        )
     for number, log in enumerate(logs):
         mended, rows = log.without_lost_rows()
         parts = mended.parts()

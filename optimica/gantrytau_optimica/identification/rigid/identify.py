@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import Model, translate
+from gantrytau.border.checks import check_words, number
 from gantrytau.dae import Dae
 from gantrytau_optimica.fitting.diagnostics import diagnose
 from gantrytau_optimica.fitting.finding import Finding
@@ -17,7 +18,7 @@ from gantrytau_optimica.identification.residuals.force_diagnostics import force_
 from gantrytau_optimica.identification.residuals.position_noise import unbiased
 from gantrytau_optimica.identification.rigid.chosen_parameters import (
     asked_parameters,
-    check_call,
+    check_logs,
     fixed_values,
     is_friction,
 )
@@ -74,10 +75,13 @@ def identify(
 
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """
+    check_words(identify, locals())
+    number("identify", "cutoff", cutoff, above=0.0)
+    number("identify", "minimum_speed", minimum_speed, least=0.0)
     dae = robot if isinstance(robot, Dae) else translate(robot)
     logs = [log] if isinstance(log, MotionLog) else list(log)
     coordinates, forces = drives(dae)
-    check_call(dae, logs, coordinates, friction, minimum_speed)
+    check_logs(dae, logs, coordinates)
     parts, findings = usable_parts(logs, cutoff)
     findings += beside_robot(dae, coordinates, logs, findings)
     given = fixed_values(dae, fixed or {}, len(coordinates), friction)

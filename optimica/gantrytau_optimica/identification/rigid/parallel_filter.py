@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
-from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 
 ORDER = 4
 WIDER = 4.0  # times the cutoff, of the filter before encoders are differentiated
@@ -76,7 +77,7 @@ def low_pass(y: np.ndarray, period: float, cutoff: float) -> np.ndarray:
 def filtered_motion(log: MotionLog, cutoff: float) -> FilteredMotion:
     """A log without gaps, thinned to what the cutoff (Hz) leaves of it, with speeds and accelerations.
 
-    Raises IdentificationError for a cutoff that the rate of the log does not bear.
+    Raises ModelError for a cutoff that the rate of the log does not bear.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -87,9 +88,10 @@ def filtered_motion(log: MotionLog, cutoff: float) -> FilteredMotion:
         q, f, t = (*(make_interp_spline(t, x, k=3)(even) for x in (q, f)), even)
     rate = 1 / period
     if not 0 < cutoff < rate / 5:
-        raise IdentificationError(
-            f"identify: cutoff is {cutoff:g} Hz, expected more than 0 and less than a fifth of the log's rate of "
-            f"{rate:g} Hz; lower it, or log faster"
+        raise ModelError(
+            f"expected less than a fifth of the log's rate of {rate:g} Hz; lower it, or log faster",
+            place="identify",
+            found=Given("cutoff", cutoff),
         )
     thinned = max(1, int(rate / (SAMPLES * cutoff)))
     spline = make_interp_spline(t, low_pass(q, period, _wide(period, cutoff)), k=5)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array
 from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.finding import rows_in_words
 from gantrytau_optimica.identification.spectra.sampled_motion import rows_of
@@ -30,16 +31,14 @@ class StepResponse(Record):
 
     def __post_init__(self):
         for name in ("t", "reference", "position"):
-            object.__setattr__(self, name, _numbers(name, getattr(self, name)))
-        rows, shape = len(self.t), self.position.shape
-        for name, expected in (("reference", shape), ("position", (rows, shape[1]))):
-            found = getattr(self, name).shape
-            if found != expected:
-                raise ModelError(
-                    f"StepResponse: found {name} of shape {found}, expected {expected}: one row for each of {rows} times, "
-                    "one column for each actuator",
-                    argument=name,
-                )
+            object.__setattr__(self, name, rows_of("StepResponse", name, getattr(self, name)))
+        rows, actuators = len(self.t), self.position.shape[1]
+        for name, shape in (
+            ("t", (rows,)),
+            ("reference", (rows, actuators)),
+            ("position", (rows, actuators)),
+        ):
+            array("StepResponse", name, getattr(self, name), shape)
         _check_times(self.t)
 
     @property
@@ -121,22 +120,9 @@ def _check_actuator(i: int, steps: Sequence[StepResponse]) -> None:
         )
 
 
-def _numbers(name: str, values: Any) -> np.ndarray:
-    found = rows_of("StepResponse", name, values)
-    bad = np.flatnonzero(~np.isfinite(np.atleast_2d(found.T)).all(axis=0))
-    if bad.size or not found.size:
-        where = f"that is not finite in {rows_in_words(bad)}" if bad.size else f"of shape {found.shape}"
-        raise ModelError(
-            f"StepResponse: found {name} {where}, expected numbers in every row, as a response depends on all rows before; "
-            "cut the log there, or repair it",
-            argument=name,
-        )
-    return found
-
-
 def _check_times(t: np.ndarray) -> None:
     if len(t) < 2:
-        raise ModelError("StepResponse: found one row, expected those of a step", argument="t")
+        raise ModelError(f"found {len(t)} rows, expected those of a step", place="StepResponse", argument="t")
     steps = np.diff(t)
     period = float(np.median(steps))
     off = np.flatnonzero(~(np.abs(steps - period) <= EVEN * period)) + 1

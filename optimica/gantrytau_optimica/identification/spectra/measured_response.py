@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
-from gantrytau.border.checks import number
+from gantrytau.border.checks import number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
@@ -49,12 +49,8 @@ def measured_response(u: ArrayLike, y: ArrayLike, *, period: float, blocks: int 
     Resonances narrower than blocks / (N period) Hz are blunted. Raises ModelError for samples that are too few, or none.
     """
     place = "measured_response"
+    whole(place, "blocks", blocks, least=2)
     number(place, "period", period, unit="s", above=0)
-    whole = isinstance(blocks, (int, np.integer)) and not isinstance(blocks, bool)
-    if not whole or blocks < 2:
-        raise ModelError(
-            f"{place}: found blocks={blocks!r}, expected a whole number from 2 on", argument="blocks"
-        )
     u, y = sampled_motion(place, u, y, least=SHORTEST * blocks)
     inputs = u.shape[1]
     if blocks < 2 * inputs:

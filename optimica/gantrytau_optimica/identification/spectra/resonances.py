@@ -26,6 +26,7 @@ def resonances(
     from scipy.signal import find_peaks
 
     number("resonances", "period", period, unit="s", above=0)
+    number("resonances", "share", share, above=0.0, below=1.0)
     y = np.asarray(y, dtype=float)
     columns = y[:, None] if y.ndim == 1 else y
     if columns.ndim != 2 or len(columns) < LEAST or not np.all(np.isfinite(columns)):
@@ -37,10 +38,6 @@ def resonances(
     if not 0 <= low < high:
         raise ModelError(
             f"resonances: found band={band!r}, expected (lowest, highest) in Hz", argument="band"
-        )
-    if not 0 < share < 1:
-        raise ModelError(
-            f"resonances: found share={share!r}, expected a number from 0 to 1", argument="share"
         )
     moving = columns - columns.mean(axis=0)
     if np.abs(moving).max() <= ROUNDING * np.abs(columns).max():

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError, StateSpace
-from gantrytau.border.checks import number
+from gantrytau.border.checks import number, whole
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
@@ -105,6 +105,8 @@ def identify_system(
     for inputs that do not excite and for a system that runs away. Van Overschee and De Moor (1996);
     Dressler (2012), (6.12), (6.13).
     """
+    whole("identify_system", "block_rows", block_rows, least=2)
+    whole("identify_system", "order", order, least=1)
     number("identify_system", "period", period, unit="s", above=0)
     u, y = sampled_motion("identify_system", u, y, least=2)
     _check_sizes(u, y, order, block_rows)
@@ -140,12 +142,6 @@ def _diagnostics(y: np.ndarray, simulated: np.ndarray, period: float) -> Diagnos
 
 
 def _check_sizes(u: np.ndarray, y: np.ndarray, order: int, block_rows: int) -> None:
-    for name, value, least in (("block_rows", block_rows, 2), ("order", order, 1)):
-        if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < least:
-            raise ModelError(
-                f"identify_system: found {name}={value!r}, expected a whole number from {least} on",
-                argument=name,
-            )
     m, p = u.shape[1], y.shape[1]
     if order > (block_rows - 1) * p:
         raise ModelError(

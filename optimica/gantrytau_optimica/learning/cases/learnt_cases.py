@@ -68,13 +68,10 @@ def learn_cases(
         tell = progress or _quietly
         try:
             found[case.name] = _learnt(case, plant, rig, folder, force, tell)
-        except ModelError as error:
-            raise ModelError(f"{rig.file}: case {case.name}: {error}", argument=error.argument) from error
-        except LearningError as error:
+        except (ModelError, LearningError) as error:
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise
-            told = f"{rig.file}: case {case.name}: {error}"
-            raise LearningError(told, history=error.history, argument=error.argument) from error
+            raise error.within(f"{rig.file}: case {case.name}") from error
     return LearntCases(found)
 
 

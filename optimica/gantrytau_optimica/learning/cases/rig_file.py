@@ -170,7 +170,7 @@ class RigFile(Record):
             servos = models.cart_servos(record, r=r, period=period)
             return Rig(robot, servos, period=period, noise=self.scatter, stiff=models.GantryTau(record))
         except GantryTauError as error:
-            raise ModelError(f"{place}: {error}") from error
+            raise error.within(place) from error
 
 
 def read_rig(path: str | Path) -> RigFile:
@@ -181,14 +181,12 @@ def read_rig(path: str | Path) -> RigFile:
     file = Path(path)
     table = read_toml(file)
     whole = f"{file}: "
-    for name in table:
-        if name not in TABLES:
-            raise ModelError(f"{whole}[{name}]: there is no such table{did_you_mean(name, TABLES)}")
-    for name in ("rig", "reference", "case"):
-        if name not in table:
-            raise ModelError(
-                f"{whole}found no table [{name}], expected one; `gantrytau learn --example` prints a whole file"
-            )
+    read_table(whole, table, dict.fromkeys(TABLES, Value("bodies")))
+    missing = [name for name in ("rig", "reference", "case") if name not in table]
+    if missing:
+        raise ModelError(
+            f"{whole}found no table [{missing[0]}], expected one; `gantrytau learn --example` prints a whole file"
+        )
     rig = read_table(f"{whole}rig", table["rig"], RIG)
     if ("record" in rig) == ("plant" in rig):
         raise ModelError(
@@ -290,4 +288,4 @@ def _made(place: str, make: Any, values: Mapping[str, Any]) -> Any:
     try:
         return make(**values)
     except ModelError as error:
-        raise ModelError(f"{place}: {error}") from error
+        raise error.within(place) from error

@@ -14,6 +14,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.border.checks import number, whole
 from gantrytau_optimica.learning.design.q_search import QProblem, closed, sizes_of, widest
 from gantrytau_optimica.learning.design.uncertain_modes import OverFrequencies, Uncertain, resonant, uncertain
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
@@ -46,9 +47,13 @@ def design_q(
     axis one, several or None; samples: of the window in which the worst of the family is checked over a whole run.
     Raises ModelError for responses of different periods or axes, for a law that goes by a model, and where no filter holds.
     """
+    number("design_q", "limit", limit, above=0.0)
+    number("design_q", "margin", margin, above=0.0, below=1.0)
+    whole("design_q", "notches", notches, least=0, most=6)
+    whole("design_q", "samples", samples, least=1)
     family, law = members_of(responses, learning)
     period = float(family[0].period or 0.0)
-    _check(period, limit, margin, notches)
+    number("design_q", "limit", limit, below=0.5 / period)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])  # (members, F, m, m)
     named = _named(at, left.shape[-1], 0.5 / period)
@@ -208,19 +213,3 @@ def rest(member: OverFrequencies, law: Shifted, hz: np.ndarray) -> np.ndarray:
         )
     L = law.gain * np.exp(2j * np.pi * hz * float(member.period or 0.0) * law.shift)
     return np.eye(T.shape[-1]) - L[:, None, None] * T
-
-
-def _check(period: float, limit: float, margin: float, notches: int) -> None:
-    if not 0 < limit < 0.5 / period:
-        raise ModelError(
-            f"design_q: found limit={limit!r}, expected Hz below half the sampling frequency, {0.5 / period:g}",
-            argument="limit",
-        )
-    if not 0 < margin < 1:
-        raise ModelError(
-            f"design_q: found margin={margin!r}, expected a number between 0 and 1", argument="margin"
-        )
-    if isinstance(notches, bool) or not isinstance(notches, (int, np.integer)) or not 0 <= notches <= 6:
-        raise ModelError(
-            f"design_q: found notches={notches!r}, expected a whole number from 0 to 6", argument="notches"
-        )

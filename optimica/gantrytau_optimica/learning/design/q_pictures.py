@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gantrytau.border.checks import number
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.learning.design.design_q import frequencies, members_of, rest
 from gantrytau_optimica.learning.design.q_search import sizes_of
@@ -33,6 +34,7 @@ def plot_q(
 
     if file is not None:
         check_suffix(file)
+    number("plot_q", "limit", limit, above=0.0)
     family, law = members_of(responses, learning)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])

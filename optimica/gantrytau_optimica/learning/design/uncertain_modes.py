@@ -12,6 +12,8 @@ import numpy as np
 
 from gantrytau import ModelError, StateSpace
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.border.checks import array, instance
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.learning.laws.lifted import pulses
 from gantrytau_optimica.learning.runs.estimated_response import EstimatedResponse
 
@@ -54,19 +56,11 @@ def uncertain(
     for multiples that are not above zero or leave a mode undamped, and for modes that are not apart.
     """
     for name, values in (("frequencies", frequencies), ("damping", damping)):
-        try:
-            multiples = np.asarray(values, dtype=float)
-        except (TypeError, ValueError):
-            multiples = np.zeros(0)
-        if multiples.ndim != 1 or not multiples.size or not np.all(np.isfinite(multiples) & (multiples > 0)):
-            raise ModelError(
-                f"uncertain: found {name}={values!r}, expected numbers above zero, in a list", argument=name
-            )
-    if not isinstance(response, Uncertain):
-        raise ModelError(
-            f"uncertain: found the response {response!r}, expected a sampled linear system, or one by estimated_response",
-            argument="response",
-        )
+        multiples = array("uncertain", name, values, (None,))
+        if not multiples.size or multiples.min() <= 0:
+            raise ModelError("expected numbers above zero", place="uncertain", found=Given(name, values))
+    expected = "a sampled linear system, or one by estimated_response"
+    instance("uncertain", "response", response, Uncertain, expected)
     return tuple(_moved(response, f, d) for f in frequencies for d in damping)
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.learning.estimators.estimator import Estimator
 from gantrytau_optimica.learning.filters.zero_phase import ZeroPhase
 
@@ -47,12 +48,10 @@ class Complementary(Estimator):
     reads = ("z", "a")
 
     def __post_init__(self):
-        if not 1 <= np.size(self.hz) <= 3:
-            raise ModelError(
-                f"Complementary: found hz={self.hz!r}, expected a frequency in Hz, or one for each of x, y and z",
-                argument="hz",
-            )
         ZeroPhase.butterworth(self.order, self.hz)
+        if np.size(self.hz) > 3:
+            expected = "expected a frequency in Hz, or one for each of x, y and z"
+            raise ModelError(expected, place="Complementary", found=Given("hz", self.hz))
 
     def combine(self, signals: Mapping[str, np.ndarray], period: float) -> np.ndarray:
         z, a = signals["z"], signals["a"]

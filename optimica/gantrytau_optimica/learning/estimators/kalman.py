@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from gantrytau import ModelError, Result
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.border.checks import instance, number
 from gantrytau_optimica.learning.estimators.estimator import Estimator, sampling_period
 from gantrytau_optimica.learning.pose_maps import PoseMap
 
@@ -49,12 +50,8 @@ class Kalman(Estimator):
     reads = ("z", "a")
 
     def __post_init__(self):
+        number("Kalman", "r", self.r, above=0.0)  # a tiny one follows the model alone
         _check_system(self.system)
-        if not (_number(self.r) and 0 < self.r < np.inf):
-            raise ModelError(
-                f"Kalman: found r={self.r!r}, expected a variance above zero, in m2; a tiny one follows the model alone",
-                argument="r",
-            )
         _ = self._correction  # refused here, if at all
 
     def __repr__(self) -> str:
@@ -193,10 +190,6 @@ def _root(square: np.ndarray) -> np.ndarray:
     return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-def _number(value: object) -> bool:
-    return isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-
-
 def _covariance(noise: ArrayLike, axes: int) -> np.ndarray:
     """R2 (p, p) of a deviation or a covariance. Raises ModelError for what is neither."""
     found = np.asarray(noise, dtype=float)
@@ -215,11 +208,8 @@ def _covariance(noise: ArrayLike, axes: int) -> np.ndarray:
 
 
 def _check_system(system: LinearSystem) -> None:
-    if not isinstance(system, LinearSystem):
-        raise ModelError(
-            f"Kalman: found the system {system!r}, expected a sampled linear one such as identify_system finds",
-            argument="system",
-        )
+    expected = "a sampled linear one such as identify_system finds"
+    instance("Kalman", "system", system, LinearSystem, expected)
     if system.period is None:
         raise ModelError(
             f"Kalman: found {system.title} that is continuous, expected a sampled one; take system.discrete(period)",

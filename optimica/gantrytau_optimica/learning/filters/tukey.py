@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import number
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,13 @@ class Tukey:
     lead: float = 0.4
     alpha: float = 0.95
 
+    def __post_init__(self):
+        for name in ("start", "stop"):
+            if getattr(self, name) is not None:
+                number("Tukey", name, getattr(self, name), least=0.0)
+        number("Tukey", "lead", self.lead, least=0.0)
+        number("Tukey", "alpha", self.alpha, least=0.0, most=1.0)
+
     def weights(self, samples: int, period: float) -> np.ndarray:
         """Weights (N,) of samples every period s from zero. Raises ModelError for a window that does not fit the run."""
         from scipy.signal.windows import tukey
@@ -32,13 +40,11 @@ class Tukey:
                 f"Tukey: found a window from {first * period:g} to {last * period:g} s, expected one within the run of "
                 f"{samples * period:g} s"
             )
-        if not 0 <= 2 * flank <= last - first:
+        if not 2 * flank <= last - first:
             raise ModelError(
                 f"Tukey: found flanks of {flank * period:g} s in a window of {(last - first) * period:g} s, expected both "
                 "to fit; take a shorter lead"
             )
-        if not 0 <= self.alpha <= 1:
-            raise ModelError(f"Tukey: found alpha={self.alpha!r}, expected a share from 0 to 1")
         found = np.zeros(samples)
         shape = tukey(2 * flank, self.alpha)
         found[first:last] = 1.0

@@ -13,6 +13,8 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, number, whole
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 
 
@@ -44,11 +46,8 @@ class ZeroPhase(Record):
 
         Raises ModelError for what is no order or no frequency.
         """
-        if not (isinstance(order, (int, np.integer)) and 1 <= order <= 20):
-            raise ModelError(
-                f"ZeroPhase.butterworth: found order={order!r}, expected a whole number from 1 to 20"
-            )
-        return cls(tuple(_low_pass(order, _frequency("hz", f)) for f in np.atleast_1d(hz)))
+        whole("ZeroPhase.butterworth", "order", order, least=1, most=20)
+        return cls(tuple(_low_pass(order, float(f)) for f in _frequencies(hz)))
 
     def notched(self, hz: float, width: float, depth: float) -> Self:
         """With a notch in all axes: gain depth^2 at hz; width: the damping ratio of its poles."""
@@ -90,12 +89,9 @@ class ZeroPhase(Record):
 
 def notch(hz: float, width: float, depth: float) -> BiquadSection:
     """(p^2 + 2 width depth p + 1) / (p^2 + 2 width p + 1): gain depth at hz."""
-    _frequency("hz", hz)
-    if not (np.isfinite(width) and width > 0 and np.isfinite(depth) and depth >= 0):
-        raise ModelError(
-            f"ZeroPhase.notched: found width={width!r}, depth={depth!r}, expected a damping ratio above zero and a gain "
-            "of zero at least"
-        )
+    number("ZeroPhase.notched", "hz", hz, above=0.0)
+    number("ZeroPhase.notched", "width", width, above=0.0)
+    number("ZeroPhase.notched", "depth", depth, least=0.0)
     return BiquadSection(float(hz), (1.0, 2 * width * depth, 1.0), (1.0, 2 * width, 1.0))
 
 
@@ -118,7 +114,10 @@ def _low_pass(order: int, hz: float) -> tuple[BiquadSection, ...]:
     return (*pairs, *([BiquadSection(hz, (0.0, 0.0, 1.0), (0.0, 1.0, 1.0))] if order % 2 else []))
 
 
-def _frequency(name: str, value: float) -> float:
-    if not (np.ndim(value) == 0 and np.isfinite(value) and value > 0):
-        raise ModelError(f"ZeroPhase: found {name}={value!r}, expected a frequency above zero in Hz")
-    return float(value)
+def _frequencies(hz: Any) -> np.ndarray:
+    """Frequencies in Hz, (k,); ModelError unless all are above zero."""
+    found = np.atleast_1d(array("ZeroPhase.butterworth", "hz", hz, (), (None,)))
+    if not found.size or not np.all(found > 0):
+        expected = "expected frequencies above zero in Hz"
+        raise ModelError(expected, place="ZeroPhase.butterworth", found=Given("hz", hz))
+    return found

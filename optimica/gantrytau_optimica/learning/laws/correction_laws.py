@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.laws.lifted import Response, axes_of, lifted, norm
 
@@ -33,10 +34,8 @@ class Shifted:
     shift: int = 5
 
     def __post_init__(self):
-        if not (np.isfinite(self.gain) and isinstance(self.shift, (int, np.integer)) and self.shift >= 0):
-            raise ModelError(
-                f"Learning: found gain={self.gain!r}, shift={self.shift!r}, expected a number and a whole number of samples"
-            )
+        number("Learning", "gain", self.gain)
+        whole("Learning", "shift", self.shift, least=0)
 
     def corrections(self, error: np.ndarray) -> np.ndarray:
         return self.gain * error[np.minimum(np.arange(len(error)) + self.shift, len(error) - 1)]
@@ -61,9 +60,10 @@ class NormOptimal(Record):
     response: Response | None = None  # measured by `learn` if None
     weight: float = 1e-2
 
+    def __post_init__(self):
+        number("NormOptimal", "weight", self.weight, above=0.0)
+
     def corrections(self, error: np.ndarray) -> np.ndarray:
-        if not (np.isfinite(self.weight) and self.weight > 0):
-            raise ModelError(f"NormOptimal: found weight={self.weight!r}, expected a number above zero")
         from scipy.linalg import cho_factor, cho_solve
 
         T = _model(self.response, error)

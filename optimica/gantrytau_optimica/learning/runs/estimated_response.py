@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import ModelError, Result, prbs
+from gantrytau.border.checks import number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
 from gantrytau_optimica.identification.systems.identify_system import IdentifiedSystem, identify_system
@@ -103,6 +104,7 @@ def estimated_response(
     samples identifies a system of this order, or of the one of several that foretells the other half best. Raises
     ModelError where the estimate does not follow the corrections.
     """
+    _check_numbers("estimated_response", amplitude, order, seed)
     corrections = Corrections(plant.kinematics, estimator.joints, reference.moving)
     u, run = excited(plant, reference.r[0], corrections, amplitude, seed)
     signals = estimator.signals(run, plant.kinematics)
@@ -114,6 +116,13 @@ def estimated_response(
     seen = Seen(estimator, widths, corrections.picked, plant.period)
     system, fit = _foretelling(seen, u, y, (order,) if order else ORDERS)
     return EstimatedResponse(system, delay, seen, fit)
+
+
+def _check_numbers(place: str, amplitude: float, order: int | None, seed: int) -> None:
+    number(place, "amplitude", amplitude, above=0.0)
+    if order is not None:
+        whole(place, "order", order, least=1)
+    whole(place, "seed", seed, least=0)
 
 
 def excited(
@@ -141,6 +150,7 @@ def arm_model(
     The plant is excited at rest where the reference begins, along all axes: the model that `Kalman` goes by, (6.13). Raises
     ModelError for a plant without gauges.
     """
+    _check_numbers("arm_model", amplitude, order, seed)
     corrections = Corrections(plant.kinematics, False, (0, 1, 2))
     _, run = excited(plant, reference.r[0], corrections, amplitude, seed)
     z, r = (each.signals(run, plant.kinematics) for each in (Kinematic(), Measured()))

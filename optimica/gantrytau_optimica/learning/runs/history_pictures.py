@@ -2,14 +2,13 @@
 
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.border.refusal import did_you_mean
+from gantrytau.border.checks import one_of
 from gantrytau.results.figures import check_suffix, finished
-from gantrytau_optimica.learning.runs.reference import Reference
 from gantrytau_optimica.learning.servo_loop import unit_of
 
 if TYPE_CHECKING:
@@ -18,53 +17,15 @@ if TYPE_CHECKING:
 MILLI = 1e3
 
 
-class Runs(Protocol):
-    """What pictures need of a history."""
-
-    @property
-    def reference(self) -> Reference: ...
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
-    def columns(self) -> tuple[int, ...]: ...
-
-    @property
-    def full(self) -> np.ndarray: ...
-
-    @property
-    def inputs(self) -> np.ndarray: ...
-
-    @property
-    def tool(self) -> np.ndarray: ...
-
-    @property
-    def relative(self) -> np.ndarray: ...
-
-    @property
-    def tool_relative(self) -> np.ndarray: ...
-
-    def error(self, k: int = -1) -> np.ndarray: ...
-
-    def tool_error(self, k: int = -1) -> np.ndarray: ...
-
-    def __len__(self) -> int: ...
-
-
-def draw(history: Runs, what: str, file: str | os.PathLike[str] | None) -> "Figure":
+def draw(history: Any, what: str, file: str | os.PathLike[str] | None) -> "Figure":
     """One of PICTURES. Raises ModelError for another."""
-    if what not in PICTURES:
-        raise ModelError(
-            f"History.plot: found '{what}', expected one of {', '.join(PICTURES)}{did_you_mean(what, PICTURES)}",
-            argument="what",
-        )
+    one_of("History.plot", "what", what, PICTURES)
     if file is not None:
         check_suffix(file)
     return finished(PICTURES[what](history), file)
 
 
-def plot_learning(histories: Mapping[str, Runs], *, file: str | os.PathLike[str] | None = None) -> "Figure":
+def plot_learning(histories: Mapping[str, Any], *, file: str | os.PathLike[str] | None = None) -> "Figure":
     """Errors of the measured tool over runs, by axis, of several ways to learn: Dressler (2012), Figures 7.16 to 7.18."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import MaxNLocator
@@ -86,7 +47,7 @@ def plot_learning(histories: Mapping[str, Runs], *, file: str | os.PathLike[str]
     return finished(figure, file)
 
 
-def _errors(history: Runs) -> "Figure":
+def _errors(history: Any) -> "Figure":
     import matplotlib.pyplot as plt
     from matplotlib.ticker import MaxNLocator
 
@@ -102,7 +63,7 @@ def _errors(history: Runs) -> "Figure":
     return figure
 
 
-def _over_time(title: str, history: Runs, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
+def _over_time(title: str, history: Any, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
     """An axis for each of rows, with lines over time in mm or mrad; what is applied in full is shaded."""
     import matplotlib.pyplot as plt
 
@@ -122,11 +83,11 @@ def _over_time(title: str, history: Runs, rows: list[tuple[str, list[tuple[str, 
     return figure
 
 
-def _ends(history: Runs) -> list[int]:
+def _ends(history: Any) -> list[int]:
     return sorted({0, len(history) - 1})
 
 
-def _error(history: Runs) -> "Figure":
+def _error(history: Any) -> "Figure":
     return _over_time(
         "errors of what is learnt from",
         history,
@@ -137,7 +98,7 @@ def _error(history: Runs) -> "Figure":
     )
 
 
-def _input(history: Runs) -> "Figure":
+def _input(history: Any) -> "Figure":
     shown = sorted({min(1, len(history) - 1), len(history) - 1})
     return _over_time(
         "corrections",
@@ -149,7 +110,7 @@ def _input(history: Runs) -> "Figure":
     )
 
 
-def _tool(history: Runs) -> "Figure":
+def _tool(history: Any) -> "Figure":
     return _over_time(
         "errors of the tool",
         history,
@@ -160,7 +121,7 @@ def _tool(history: Runs) -> "Figure":
     )
 
 
-def _path(history: Runs) -> "Figure":
+def _path(history: Any) -> "Figure":
     import matplotlib.pyplot as plt
 
     centre = history.reference.r[0]

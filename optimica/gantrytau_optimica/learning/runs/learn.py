@@ -6,11 +6,13 @@ Dressler (2012), chapter 7; Arimoto, Kawamura, Miyazaki (1984); Norrloef, Gunnar
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError, Result
-from gantrytau.border.refusal import USERS_ERRORS
+from gantrytau.border.checks import whole
+from gantrytau.border.refusal import USERS_ERRORS, Given
 from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
 from gantrytau_optimica.learning.estimators.estimators import Actuators
 from gantrytau_optimica.learning.laws.learning import Learning, Stability
@@ -34,8 +36,8 @@ RUNS = 100  # seeds apart, so that no two runs of a trial draw the same
 class LearningError(GantryTauError):
     """Learning would diverge, or a run failed. history: the runs before it, None where there are none."""
 
-    def __init__(self, message: str, *, history: History | None = None, argument: str | None = None):
-        super().__init__(message, argument=argument)
+    def __init__(self, *parts: str | Given, history: History | None = None, **facts: Any):
+        super().__init__(*parts, **facts)
         self.history = history
 
 
@@ -61,10 +63,12 @@ def learn(
     Raises ModelError for arguments that do not fit, LearningError for learning that would diverge, and for a run that
     fails, with all that was finished in `.history`.
     """
+    whole("learn", "iterations", iterations, least=0)
+    whole("learn", "seed", seed, least=0)
     learning = Learning() if learning is None else learning
     estimator = Actuators() if estimator is None else estimator
     check_kinds(rig, reference, learning, estimator)
-    check_runs("learn", rig, reference, iterations=iterations, seed=seed)
+    check_runs("learn", rig, reference)
     check_window(learning, reference)
     corrections = Corrections(rig.kinematics, estimator.joints, reference.moving)
     so_far, path = _kept(history)
@@ -76,7 +80,10 @@ def learn(
     learning = learning.with_response(response)
     stability = judged(learning, response, len(reference), corrections.count, rig.period)
     if stability.diverges and not force:
-        raise LearningError(f"learn: {stability}; force=True runs it all the same", argument="learning")
+        remedy = Given("force", True)
+        raise LearningError(
+            f"{stability}; ", remedy, " runs it all the same", place="learn", argument="learning"
+        )
     found = replace(found, stability=stability)
     for k in range(len(found), iterations + 1):
         found = _next_run(rig, found, learning, estimator, corrections, RUNS * seed + k)

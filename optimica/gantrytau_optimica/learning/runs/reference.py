@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, number, whole
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 
 STILL = 1e-9  # m, by which the first two samples may differ
@@ -25,16 +27,13 @@ class Reference(Record):
 
     def __post_init__(self):
         for name, columns in (("t", 0), ("r", 3)):
-            found = np.array(getattr(self, name), dtype=float)
-            expected = f"(N, {columns})" if columns else "(N,)"
-            if found.ndim != 1 + (columns > 0) or (columns and found.shape[1] != columns) or len(found) < 3:
+            shape = (None, columns) if columns else (None,)
+            found = array("Reference", name, getattr(self, name), shape)
+            if len(found) < 3:
                 raise ModelError(
-                    f"Reference: found {name} of shape {found.shape}, expected {expected}, N of 3 at least",
+                    f"found {len(found)} rows of {name}, expected 3 at least",
+                    place="Reference",
                     argument=name,
-                )
-            if not np.all(np.isfinite(found)):
-                raise ModelError(
-                    f"Reference: found {name} that is not finite, expected numbers", argument=name
                 )
             found.flags.writeable = False
             object.__setattr__(self, name, found)
@@ -86,16 +85,17 @@ def square_reference(
     size: m, of an edge; start: m; move: s of motion along an edge, with a speed like sin^2, whose peak is 2 size / move;
     edge: s of motion and stop; begin: s of rest before; duration: s. Raises ModelError for times that do not fit.
     """
-    if not (0 < move <= edge and begin >= 2 * period and rounds >= 1 and size > 0):
-        raise ModelError(
-            f"square_reference: found size={size!r}, move={move!r}, edge={edge!r}, begin={begin!r}, rounds={rounds!r}, "
-            "expected a size above zero, a move of at most an edge, and a begin of two samples at least"
-        )
+    given = dict(size=size, move=move, edge=edge, begin=begin, duration=duration, period=period)
+    for name, value in given.items():
+        number("square_reference", name, value, above=0.0)
+    whole("square_reference", "rounds", rounds, least=1)
+    number("square_reference", "move", move, most=edge)
+    number("square_reference", "begin", begin, least=2 * period)
     if begin + 4 * rounds * edge > duration + period:
         raise ModelError(
-            f"square_reference: found duration={duration!r}, expected {begin + 4 * rounds * edge:g} s at least: {begin:g} "
-            f"s of rest and {4 * rounds} edges of {edge:g} s",
-            argument="duration",
+            f"expected {begin + 4 * rounds * edge:g} s at least: {begin:g} s of rest and {4 * rounds} edges of {edge:g} s",
+            place="square_reference",
+            found=Given("duration", duration),
         )
     t = period * np.arange(round(duration / period))
     r = np.tile(np.asarray(start, dtype=float), (len(t), 1))

@@ -1,12 +1,12 @@
 """How well a robot repeats a motion: what no learning can take away."""
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau import GantryTauError, ModelError
+from gantrytau import GantryTauError
+from gantrytau.border.checks import array, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.filters.tukey import Tukey
 from gantrytau_optimica.learning.runs.corrections import Corrections
@@ -68,23 +68,11 @@ def repeat(
     corrections of another shape, or beyond the limits of joints, a reference of another period, and fewer than two runs;
     LearningError for a run that fails.
     """
+    whole("repeat", "runs", runs, least=2)
     check_runs("repeat", rig, reference, seed=seed)
-    if isinstance(runs, bool) or not isinstance(runs, (int, np.integer)) or runs < 2:
-        raise ModelError(f"repeat: found runs={runs!r}, expected a whole number, 2 and more", argument="runs")
     at = Corrections(rig.kinematics, True, reference.moving)
     q_r = at.wanted(reference.r)
-    if isinstance(corrections, (str, os.PathLike)):
-        raise ModelError(
-            f"repeat: found corrections={str(corrections)!r}, expected numbers; read the file, "
-            "read_corrections(path, rig.kinematics.joints, reference.t)",
-            argument="corrections",
-        )
-    u = np.zeros_like(q_r) if corrections is None else np.asarray(corrections, dtype=float)
-    if u.shape != q_r.shape or not np.all(np.isfinite(u)):
-        raise ModelError(
-            f"repeat: found corrections of shape {u.shape}, expected finite numbers, {q_r.shape}",
-            argument="corrections",
-        )
+    u = np.zeros_like(q_r) if corrections is None else array("repeat", "corrections", corrections, q_r.shape)
     q_ref, v_ref = at.references(reference.r, u, rig.period)
     q = np.array([_measured(rig, q_ref, v_ref, RUNS * seed, k) for k in range(runs)])
     weights = (window or Tukey(lead=0.0)).full(len(reference), reference.period)

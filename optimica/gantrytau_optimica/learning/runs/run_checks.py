@@ -3,6 +3,7 @@
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import instance, whole
 from gantrytau_optimica.learning.estimators.estimator import Estimator
 from gantrytau_optimica.learning.laws.learning import Learning
 from gantrytau_optimica.learning.runs.corrections import Corrections
@@ -21,16 +22,9 @@ def check_kinds(rig: object, reference: object, learning: object, estimator: obj
             f"learn: found {rig!r} without {', '.join(lacking)}, expected a Rig or another plant",
             argument="rig",
         )
-    for name, value, kind, example in (
-        ("reference", reference, Reference, "square_reference(0.01)"),
-        ("learning", learning, Learning, "Learning(window=Tukey(1.2, 4.5))"),
-        ("estimator", estimator, Estimator, "Actuators()"),
-    ):
-        if not isinstance(value, kind):
-            raise ModelError(
-                f"learn: found {name}={type(value).__name__}, expected one such as {example}",
-                argument=name,
-            )
+    instance("learn", "reference", reference, Reference, "one such as square_reference(0.01)")
+    instance("learn", "learning", learning, Learning, "one such as Learning(window=Tukey(1.2, 4.5))")
+    instance("learn", "estimator", estimator, Estimator, "one such as Actuators()")
 
 
 def check_window(learning: Learning, reference: Reference) -> None:
@@ -46,10 +40,7 @@ def check_window(learning: Learning, reference: Reference) -> None:
 def check_runs(verb: str, rig: Plant, reference: Reference, **counts: int) -> None:
     """Raises ModelError for counts that are none, by their names, and for a reference of another period than the rig's."""
     for name, value in counts.items():
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 0:
-            raise ModelError(
-                f"{verb}: found {name}={value!r}, expected a whole number, 0 and more", argument=name
-            )
+        whole(verb, name, value, least=0)
     if abs(reference.period - rig.period) > 1e-6 * rig.period:
         raise ModelError(
             f"{verb}: found a reference every {reference.period:g} s, expected every {rig.period:g} s as the rig; sample it "

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from gantrytau import ModelError, Result, Samples
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_optimica.learning.pose_maps import PoseMap
@@ -41,9 +42,7 @@ class SimulatorPlant(Record):
         a: Names | None = None,
         noise: Scatter | None = None,
     ):
-        if not (isinstance(period, (int, float)) and 0 < period < np.inf):
-            raise ModelError(f"SimulatorPlant: found period={period!r}, expected a number above zero, in s")
-        self.period = float(period)
+        self.period = number("SimulatorPlant", "period", period, above=0.0)
         self.kinematics = kinematics
         self.noise = STILL if noise is None else noise
         self._simulator = simulator

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import one_of
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.vision.comparison.compare import Comparison
 from gantrytau_optimica.vision.comparison.printed_tables import ARMS
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 PARTS = ("length", "offset", "direction")
@@ -24,18 +25,14 @@ class ArmTable(Record):
 
     @classmethod
     def printed(cls, table: str) -> "ArmTable":
-        """Table "5.6" (cameras, laser) or "5.7" (tape measure, one camera) of the thesis; VisionError for another."""
-        if table not in ARMS:
-            raise VisionError(
-                f"ArmTable: found table={table!r}, expected one of {', '.join(map(repr, ARMS))}"
-            )
+        """Table "5.6" (cameras, laser) or "5.7" (tape measure, one camera) of the thesis; ModelError for another."""
+        one_of("ArmTable.printed", "table", table, ARMS)
         return cls({name: np.array([[L, *A, *v] for L, A, v in arms]) for name, arms in ARMS[table].items()})
 
     def difference(self, one: str, other: str) -> Array:
-        """Numbers of one less those of another, (arms, 7); VisionError for names that it has not."""
-        for name in (one, other):
-            if name not in self.arms:
-                raise VisionError(f"ArmTable: found no {name!r}, expected one of {', '.join(self.arms)}")
+        """Numbers of one less those of another, (arms, 7); ModelError for names that it has not."""
+        one_of("ArmTable.difference", "one", one, self.arms)
+        one_of("ArmTable.difference", "other", other, self.arms)
         return self.arms[one] - self.arms[other]
 
     def __str__(self) -> str:
@@ -58,13 +55,13 @@ def arm_table(found: Mapping[str, Calibration], frames: Mapping[str, Comparison]
 
     found: calibrations of robots whose arms have one length, offset and direction each (three links, or model=1); frames:
     the motion from the frame of a calibration's measurements to that of the table, by name, as `compare` found it; where it
-    is left out, that of the measurements. Raises VisionError for other robots and frames of names that are not there.
+    is left out, that of the measurements. Raises ModelError for other robots and frames of names that are not there.
     """
     frames = frames or {}
     unknown = [name for name in frames if name not in found]
     if unknown or not found:
         known, wrong = ", ".join(found) or "calibrations", ", ".join(unknown) or "nothing"
-        raise VisionError(f"arm_table: found frames of {wrong}, expected those of {known}")
+        raise ModelError(f"arm_table: found frames of {wrong}, expected those of {known}")
     return ArmTable({name: _moved(_numbers(name, each), frames.get(name)) for name, each in found.items()})
 
 
@@ -76,7 +73,7 @@ def _numbers(name: str, calibration: Calibration) -> Array:
         rows.append([float(x) for part in PARTS for x in np.ravel(parameters[f"arms[{k}].{part}"])])
         k += 1
     if not rows:
-        raise VisionError(
+        raise ModelError(
             f"arm_table: found {name!r} without arms[0].length, expected arms of one length each; calibrate "
             "six links with model=1"
         )

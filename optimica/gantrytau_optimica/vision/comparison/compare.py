@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import array
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
-from gantrytau_optimica.calibration.devices.devices import numbers
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 LEAST = 4  # places: three always fit
@@ -69,27 +69,22 @@ def compare(r: Any, reference: Any, *, scale: bool = False) -> Comparison:
     """Places r (N, 3) beside those of a reference (N, 3), both in m, moved onto it as well as that can be.
 
     scale: whether the scale is fitted as well, as from the laser in thesis section 5.5. Rows that are NaN in either are left
-    out. Raises VisionError for other shapes, fewer than four places, places on one line and other units.
+    out. Raises ModelError for other shapes, fewer than four places, places on one line and other units.
     """
-    a, b = numbers(r), numbers(reference)
-    if a.ndim != 2 or a.shape[1:] != (3,) or a.shape != b.shape:
-        raise VisionError(
-            f"compare: found r of shape {a.shape} and reference of shape {b.shape}, expected (N, 3) of each, the same poses"
-        )
+    a = array("compare", "r", r, (None, 3), finite=False)
+    b = array("compare", "reference", reference, a.shape, finite=False)
     known = np.asarray(np.isfinite(a).all(axis=1) & np.isfinite(b).all(axis=1))
     if known.sum() < LEAST:
-        raise VisionError(
-            f"compare: found {known.sum()} places that both measured, expected at least {LEAST}"
-        )
+        raise ModelError(f"compare: found {known.sum()} places that both measured, expected at least {LEAST}")
     a, b = a[known], b[known]
     spread = [np.linalg.svd(each - each.mean(axis=0), compute_uv=False) for each in (a, b)]
     if any(each[1] < 1e-6 * max(each[0], 1e-12) for each in spread):
-        raise VisionError(
+        raise ModelError(
             "compare: found places on one line, expected some beside it; a turn about it is not determined"
         )
     larger = spread[0][0] / spread[1][0]
     if not 1 / MILLIMETRES < larger < MILLIMETRES:
-        raise VisionError(
+        raise ModelError(
             f"compare: found r {larger:.3g} times as large as reference, expected both in m; divide mm by 1000"
         )
     R, t = motion(a, b)

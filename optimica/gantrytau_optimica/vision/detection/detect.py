@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import instance, number, whole
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.vision.boards import Pattern
 from gantrytau_optimica.vision.detection.charuco import find_charuco
@@ -13,7 +16,6 @@ from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.detection.quarter_turns import told_up
 from gantrytau_optimica.vision.detection.quincunx import find_quincunx
 from gantrytau_optimica.vision.image_series import ImageSeries, image_series, rows_of
-from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.scenes.render import Images
 
 Array = np.ndarray
@@ -36,17 +38,17 @@ def detect(
     dim; otherwise it has to be 30 grey values of 255. up: direction in the image of the side of a quincunx that is up,
     rad clockwise from the upper edge; it looks the same after a quarter of a turn, the nearest is taken. Takes about
     70 ms of one processor for a pair of images with 0.8 million pixels each.
-    Raises VisionError for folders and arrays that hold no images, or of several sizes.
+    Raises ModelError for folders and arrays that hold no images, or of several sizes.
     """
+    whole("detect", "background", background, least=0)
+    number("detect", "up", up)
     frames = images.frames if isinstance(images, Images) else images
     if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
-        raise VisionError(
-            f"detect: found images={type(images).__name__}, expected a list with a folder or an array for each camera"
+        found = Given("images", images)
+        raise ModelError(
+            "expected a list with a folder or an array for each camera", place="detect", found=found
         )
-    if not isinstance(pattern, Pattern):
-        raise VisionError(f"detect: found pattern={pattern!r}, expected a Pattern, as Pattern.quincunx(0.06)")
-    if not isinstance(background, int) or background < 0:
-        raise VisionError(f"detect: found background={background!r}, expected how many images, from 0")
+    instance("detect", "pattern", pattern, Pattern, "a Pattern, as Pattern.quincunx(0.06)")
     cameras = [image_series(each, f"camera {c + 1}") for c, each in enumerate(frames)]
     numbers = rows_of(cameras)
     shape = (len(cameras), len(numbers), len(pattern.points))
@@ -59,8 +61,8 @@ def detect(
     for c, series in enumerate(cameras):
         still, few = _background(series, background if pattern.kind == "quincunx" else 0)
         findings += few
-        for k, number in enumerate(numbers):
-            grey = series.load(number) if number in series.numbers else None
+        for k, file in enumerate(numbers):
+            grey = series.load(file) if file in series.numbers else None
             if grey is None:
                 continue
             if pattern.kind == "charuco":

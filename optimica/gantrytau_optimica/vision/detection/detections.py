@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from gantrytau import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.boards import Pattern
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 ARRAYS = ("corners", "sigma", "steps", "size", "numbers")
@@ -83,10 +83,10 @@ class Detections(Record):
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "Detections":
-        """Detections of a file as of `save`. Raises VisionError for what is none."""
+        """Detections of a file as of `save`. Raises ModelError for what is none."""
         path = Path(path)
         if not path.is_file():
-            raise VisionError(f"{path}: there is no such file; write it by Detections.save")
+            raise ModelError(f"{path}: there is no such file; write it by Detections.save")
         try:
             with np.load(path, allow_pickle=False) as kept:
                 arrays = {name: kept[name] for name in ARRAYS}
@@ -96,7 +96,7 @@ class Detections(Record):
                     Finding(f["kind"], np.array(f["rows"], dtype=int), f["message"]) for f in said["findings"]
                 )
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-            raise VisionError(
+            raise ModelError(
                 f"{path}: found no corners of images ({error}), expected a file by `gantrytau vision detect` or "
                 "Detections.save"
             ) from None

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gantrytau.border.checks import check_words
 from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.vision.detection.detections import Detections
@@ -27,7 +28,7 @@ from gantrytau_optimica.vision.reconstruction.reconstruction import Reconstructi
 from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
     check_facing,
     check_images,
-    check_words,
+    told_scale,
     usable_poses,
 )
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
@@ -60,13 +61,14 @@ def reconstruct(
     that never turn their plate, "free" fits one for each pose. corners: "plate" keeps them where the pattern has them,
     "free" takes each as a point of its own, as the thesis does, with the scale afterwards.
 
-    One camera needs the plate. Poses that fewer than two of several cameras saw are NaN. Raises VisionError for fewer than
-    ten poses, lenses that are not as many as the images or of another size, and spacing that tells nothing; what is doubtful
-    stands in `.findings`.
+    One camera needs the plate. Poses that fewer than two of several cameras saw are NaN. Raises ModelError for lenses that
+    are not as many as the images or of another size and for spacing that tells nothing, VisionError for fewer than ten poses
+    and images that do not belong together; what is doubtful stands in `.findings`.
     """
+    check_words(reconstruct, locals())
     begin = time.perf_counter()
     lenses = check_images(detections, cameras)
-    tells = check_words(intrinsics, scale, spacing, orientation, corners, len(lenses))
+    tells = told_scale(scale, spacing, corners, intrinsics, len(lenses))
     rows = usable_poses(detections)
     check_facing(detections, rows)
     plate = corners == "plate"

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.checks import array
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
-from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.scenes.scene import AHEAD
 
 Array = np.ndarray
@@ -66,13 +66,9 @@ class Reconstruction(Record):
         place: middle of the pattern in the frame of the plate, (3,) in m; R: axes of the pattern in the frame of the plate,
         (3, 3); turning: whether orientations go along, by default where they were free. One camera ahead of the pattern
         tells its tilt badly: leave them out for robots that do not turn their plate.
-        Raises VisionError for q of another number of rows.
+        Raises ModelError for q of another number of rows.
         """
-        q = np.asarray(q, dtype=float)
-        if q.ndim != 2 or len(q) != len(self.r):
-            raise VisionError(
-                f"measurements: found q of shape {q.shape}, expected ({len(self.r)}, n), a row for each pose of the images"
-            )
+        q = array("measurements", "q", q, (len(self.r), None), finite=False)
         turning = self.turning if turning is None else turning
         rows = np.flatnonzero(self.found)
         axes = self.R[rows] @ np.asarray(R, dtype=float).T

@@ -6,77 +6,69 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import did_you_mean
+from gantrytau import ModelError
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.fitting.finding import rows_in_words
 from gantrytau_optimica.vision.detection.detections import LOST, Detections
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError
 
 LEAST_POSES = 10
-KNOWN = {
-    "intrinsics": ("fixed", "estimate"),
-    "scale": ("spacing", "pattern", "both"),
-    "orientation": ("fixed", "free"),
-    "corners": ("plate", "free"),
-}
 
 
 def check_images(detections: Detections, cameras: Sequence[Camera]) -> tuple[Camera, ...]:
-    """The lenses, one for each camera of the images; VisionError where their number or size is another."""
-    if not isinstance(detections, Detections):
-        raise VisionError(
-            f"reconstruct: found {type(detections).__name__}, expected Detections, as of detect(folders, pattern)"
-        )
+    """The lenses, one for each camera of the images; ModelError where their number or size is another."""
+    expected = "Detections, as of detect(folders, pattern)"
+    instance("reconstruct", "detections", detections, Detections, expected)
     lenses = (cameras,) if isinstance(cameras, Camera) else tuple(cameras)
-    wrong = next((each for each in lenses if not isinstance(each, Camera)), None)
-    if wrong is not None:
-        words = f"found {type(wrong).__name__} among cameras, expected Camera of vision, the lens alone"
-        raise VisionError(f"reconstruct: {words}")
+    for lens in lenses:
+        instance("reconstruct", "cameras", lens, Camera, "Camera of vision, the lens alone")
     if len(lenses) != len(detections.size):
-        raise VisionError(
-            f"reconstruct: found {len(lenses)} cameras and images of {len(detections.size)}, expected one lens for each"
+        raise ModelError(
+            f"found {len(lenses)} cameras and images of {len(detections.size)}, expected one lens for each",
+            place="reconstruct",
+            argument="cameras",
         )
     for c, (lens, size) in enumerate(zip(lenses, detections.size, strict=True)):
         if tuple(lens.size) != tuple(int(n) for n in size):
-            raise VisionError(
-                f"reconstruct: camera {c + 1}: found K for {lens.size[0]} x {lens.size[1]} pixels and images of {size[0]} x "
-                f"{size[1]}, expected the same; K scales with the size of images"
+            raise ModelError(
+                f"found K for {lens.size[0]} x {lens.size[1]} pixels and images of {size[0]} x {size[1]}, expected the "
+                "same; K scales with the size of images",
+                place=f"reconstruct: camera {c + 1}",
+                argument="cameras",
             )
     return lenses
 
 
-def check_words(
-    intrinsics: str, scale: str | None, spacing: Any, orientation: str, corners: str, count: int
-) -> str:
-    """What tells the scale; VisionError for unknown words and for words that contradict each other."""
+def told_scale(scale: str | None, spacing: Any, corners: str, intrinsics: str, count: int) -> str:
+    """What tells the scale; ModelError for words that contradict each other, or do not fit the count of cameras."""
     if scale is None:
         scale = "pattern" if spacing is None else "both" if corners == "plate" else "spacing"
-    asked = dict(intrinsics=intrinsics, scale=scale, orientation=orientation, corners=corners)
-    for name, value in asked.items():
-        if value not in KNOWN[name]:
-            listed = ", ".join(map(repr, KNOWN[name]))
-            raise VisionError(
-                f"reconstruct: found {name}={value!r}, expected one of {listed}{did_you_mean(str(value), KNOWN[name])}"
+    if (scale == "pattern") == (spacing is not None):
+        words = ("expected 'both' beside ", Given("spacing"), ", which it leaves out")
+        if spacing is None:
+            words = (
+                "expected it with ",
+                Given("spacing"),
+                ", positions of the carts in m; or ",
+                Given("scale", "pattern"),
             )
-    if scale != "pattern" and spacing is None:
-        raise VisionError(
-            f"reconstruct: found scale={scale!r} without spacing, expected spacing=, positions of the carts in m; or "
-            "scale='pattern'"
-        )
-    if scale == "pattern" and spacing is not None:
-        raise VisionError(
-            "reconstruct: found spacing and scale='pattern', which leaves it out; take scale='both'"
-        )
+        raise ModelError(*words, place="reconstruct", found=Given("scale", scale))
     if corners == "free":
         refusals = {
-            "scale='both', expected 'spacing' or 'pattern': free corners are scaled once, at the end": scale
-            == "both",
-            "intrinsics='estimate', expected 'fixed': without the plate images do not tell the lenses": intrinsics
-            != "fixed",
-            "one camera, expected two or more: depth of a single corner is not seen by one": count < 2,
+            "free corners are scaled once, at the end": (scale == "both", Given("scale", scale)),
+            "without the plate images do not tell the lenses": (
+                intrinsics != "fixed",
+                Given("intrinsics", intrinsics),
+            ),
+            "depth of a single corner is not seen by one camera": (count < 2, Given("cameras")),
         }
-        for words in (words for words, there in refusals.items() if there):
-            raise VisionError(f"reconstruct: with corners='free' found {words}; corners='plate' allows it")
+        for words, (wrong, found) in refusals.items():
+            if wrong:
+                raise ModelError(
+                    f"{words}; ", Given("corners", "plate"), " allows it", place="reconstruct", found=found
+                )
     return scale
 
 

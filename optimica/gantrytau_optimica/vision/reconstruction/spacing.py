@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.devices.devices import numbers
-from gantrytau_optimica.vision.opencv import VisionError
+from gantrytau import ModelError
+from gantrytau.border.checks import array
+from gantrytau.border.refusal import Given
 
 Array = np.ndarray
 ALIKE = 1e-4  # m, by which carts of one line may stand otherwise to each other
@@ -71,19 +72,18 @@ class Spacing:
 def spacing_of(given: Any, count: int) -> Spacing:
     """The spacing of `count` poses from distances along the guideways (N,), or from positions of the carts (N, n).
 
-    Raises VisionError for other shapes, for poses that are all at one place, and for lines of one pose each.
+    Raises ModelError for other shapes, for poses that are all at one place, and for lines of one pose each.
     """
-    found = numbers(given)
-    if found.ndim not in (1, 2) or len(found) != count or not found.size:
-        raise VisionError(
-            f"reconstruct: found spacing of shape {found.shape}, expected ({count},) distances along the guideways or "
-            f"({count}, n) positions of the carts in m, one row for each pose"
-        )
+    found = array("reconstruct", "spacing", given, (count,), (count, None), finite=False)
+    if not found.size:
+        raise ModelError("expected one row for each pose", place="reconstruct", found=Given("spacing", given))
     known = np.isfinite(found).reshape(count, -1).all(axis=1)
     if np.abs(found[known]).max(initial=0.0) > FAR:
-        raise VisionError(
-            f"reconstruct: found spacing up to {np.abs(found[known]).max():g}, expected distances in m, below {FAR:g}; "
-            "divide mm by 1000"
+        raise ModelError(
+            f"found spacing up to {np.abs(found[known]).max():g}, expected distances in m, below {FAR:g}; "
+            "divide mm by 1000",
+            place="reconstruct",
+            argument="spacing",
         )
     line = np.full(count, -1)
     if found.ndim == 1 or found.shape[1] == 1:
@@ -95,15 +95,20 @@ def spacing_of(given: Any, count: int) -> Spacing:
     spacing = Spacing(np.where(known, x, np.nan), line).select(np.arange(count))
     told = spacing.line >= 0
     if not told.any():
-        raise VisionError(
-            "reconstruct: found no two poses whose carts differ by one common shift, expected lines of poses along the "
-            "guideways; move all carts alike, or give scale='pattern'"
+        raise ModelError(
+            "found no two poses whose carts differ by one common shift, expected lines of poses along the "
+            "guideways; move all carts alike, or give ",
+            Given("scale", "pattern"),
+            place="reconstruct",
+            argument="spacing",
         )
     first = np.array([np.ptp(spacing.x[spacing.line == k]) for k in range(spacing.lines)])
     if first.max() < 1e3 * STD:
-        raise VisionError(
-            f"reconstruct: found poses of a line within {first.max():.3g} m, expected a spacing above {1e3 * STD:g} m; "
-            "lengths are in m"
+        raise ModelError(
+            f"found poses of a line within {first.max():.3g} m, expected a spacing above {1e3 * STD:g} m; "
+            "lengths are in m",
+            place="reconstruct",
+            argument="spacing",
         )
     return spacing
 

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import whole
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
 from gantrytau_optimica.vision.image_files import file_name, write_image, write_poses
-from gantrytau_optimica.vision.opencv import VisionError, opencv
+from gantrytau_optimica.vision.opencv import opencv
 from gantrytau_optimica.vision.scenes.drawing import Wall, bodies, draw, wall_of
 from gantrytau_optimica.vision.scenes.scene import GREATEST, Light, Scene
 
@@ -47,19 +50,22 @@ def render(
     (`Camera.looking`, `Camera.placed`); light: one for all, or one for each pose; seed: of noise and tilt: each image has
     its own numbers, whatever other images there are. folder: write the images to folder/camera1/0000.png and so on and
     the poses to folder/poses.csv; otherwise they are kept in memory, 0.8 MB each.
-    Raises VisionError for cameras that stand nowhere, and for lights that are not as many as the poses; ModelError for
-    poses out of reach.
+    Raises ModelError for cameras that stand nowhere, lights that are not as many as the poses, and poses out of reach.
     """
+    whole("render", "seed", seed, least=0)
     r, R = scene.poses(*poses) if isinstance(poses, tuple) else scene.poses(poses)
     if not cameras or not all(isinstance(camera, PlacedCamera) for camera in cameras):
-        raise VisionError(
-            f"render: found cameras={cameras!r}, expected cameras that stand somewhere; place them by "
-            "Camera.looking(r, at) or Camera.placed(r, R)"
+        raise ModelError(
+            "expected cameras that stand somewhere; place them by Camera.looking(r, at) or Camera.placed(r, R)",
+            place="render",
+            found=Given("cameras", cameras),
         )
     lights = [light] * len(r) if isinstance(light, Light) else list(light)
     if len(lights) != len(r):
-        raise VisionError(
-            f"render: found {len(lights)} lights for {len(r)} poses, expected one, or one for each pose"
+        raise ModelError(
+            f"found {len(lights)} lights for {len(r)} poses, expected one, or one for each pose",
+            place="render",
+            argument="light",
         )
     bars = scene.links(r, R)
     walls = [wall_of(scene, camera) for camera in cameras]

@@ -3,20 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import array, instance, number, one_of, whole
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
-from gantrytau_optimica.calibration.devices.devices import checked_rotation, numbers
+from gantrytau_optimica.calibration.devices.devices import checked_rotation
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.vision.boards import Pattern
-from gantrytau_optimica.vision.opencv import VisionError
 
 Array = np.ndarray
 AHEAD = np.array(
@@ -33,7 +33,7 @@ class Light:
     gain: of all light, 1 in good light; tilt: standard deviation of a gradient over the image that differs from image
     to image, as a part of the light; lamp: a gradient that stays, half of it on each side; vignetting: what is lost in
     the corners; blur: standard deviation in pixels; noise: standard deviation in grey values; bits: 8 or 16 of an image.
-    Raises VisionError for what is negative.
+    Raises ModelError for what is negative.
     """
 
     gain: float = 1.0
@@ -43,15 +43,12 @@ class Light:
     vignetting: float = 0.3
     blur: float = 0.8
     noise: float = 2.5
-    bits: int = 8
+    bits: Literal[8, 16] = 8
 
     def __post_init__(self):
         for name in ("gain", "tilt", "lamp", "vignetting", "blur", "noise"):
-            value = getattr(self, name)
-            if not (isinstance(value, (int, float)) and 0 <= value < np.inf):
-                raise VisionError(f"Light: found {name}={value!r}, expected a number from 0")
-        if self.bits not in GREATEST:
-            raise VisionError(f"Light: found bits={self.bits!r}, expected 8 or 16")
+            number("Light", name, getattr(self, name), least=0.0)
+        one_of("Light", "bits", self.bits, GREATEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +72,10 @@ class Scene(Record):
     seed: int = 0
 
     def __post_init__(self):
-        if not isinstance(self.pattern, Pattern):
-            raise VisionError(
-                f"Scene: found pattern={self.pattern!r}, expected a Pattern, as Pattern.quincunx(0.06)"
-            )
-        place = numbers(self.place)
-        if place.shape != (3,) or not np.all(np.isfinite(place)):
-            raise VisionError(f"Scene: found place={self.place!r}, expected three finite numbers in m")
-        object.__setattr__(self, "place", place)
+        for name in ("clutter", "decoys", "seed"):
+            whole("Scene", name, getattr(self, name), least=0)
+        instance("Scene", "pattern", self.pattern, Pattern, "a Pattern, as Pattern.quincunx(0.06)")
+        object.__setattr__(self, "place", array("Scene", "place", self.place, (3,), unit="m"))
         object.__setattr__(self, "R", checked_rotation("Scene", self.R))
 
     @cached_property

@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau import ModelError
+from gantrytau.border.checks import number
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector, turned
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
@@ -15,7 +18,6 @@ from gantrytau_optimica.vision.detection.quincunx import find_quincunx, noise_of
 from gantrytau_optimica.vision.detection.square_edges import measure_edges
 from gantrytau_optimica.vision.image_series import grey_of
 from gantrytau_optimica.vision.intrinsics import Camera
-from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.relative_orientation import plates, plates_of_one, triangulated
 from gantrytau_optimica.vision.tracking.pose_fit import fitted_pose
 
@@ -54,7 +56,7 @@ class PatternTracker(Record):
 
     cameras: where they stand (`Reconstruction.cameras`, `Camera.looking`); period: between images, s; acceleration: standard
     deviation of what a predictor of constant velocity does not expect, m/s2, and rad/s2 for turns; up: of the pattern in
-    the image, as of `detect`. Filtered by Kalman with the covariance of each pose. Raises VisionError for another pattern,
+    the image, as of `detect`. Filtered by Kalman with the covariance of each pose. Raises ModelError for another pattern,
     cameras that stand nowhere and images that are not as many.
     """
 
@@ -69,21 +71,22 @@ class PatternTracker(Record):
     _missed: int = field(default=0, init=False, repr=False)
 
     def __post_init__(self):
+        for name in ("period", "acceleration", "turning"):
+            number("PatternTracker", name, getattr(self, name), above=0.0)
+        number("PatternTracker", "up", self.up)
         if not isinstance(self.pattern, Pattern) or self.pattern.kind != "quincunx":
-            raise VisionError(
-                f"PatternTracker: found pattern={self.pattern!r}, expected Pattern.quincunx(side); its edges are followed"
+            raise ModelError(
+                "expected Pattern.quincunx(side); its edges are followed",
+                place="PatternTracker",
+                found=Given("pattern", self.pattern),
             )
         self.cameras = tuple(self.cameras)
         if not self.cameras or not all(isinstance(camera, PlacedCamera) for camera in self.cameras):
-            raise VisionError(
-                "PatternTracker: found cameras that stand nowhere, expected those of a Reconstruction, or "
-                "Camera.looking(r, at)"
+            raise ModelError(
+                "expected those of a Reconstruction, or Camera.looking(r, at)",
+                place="PatternTracker",
+                found=Given("cameras", self.cameras),
             )
-        for name in ("period", "acceleration", "turning"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise VisionError(
-                    f"PatternTracker: found {name}={getattr(self, name)!r}, expected a number above 0"
-                )
 
     def update(self, images: Sequence[Any]) -> Tracked | None:
         """The pattern in the images of all cameras at the next instant; None until it was seen once.
@@ -91,8 +94,10 @@ class PatternTracker(Record):
         images: (height, width) of 8 or 16 bits each. A pattern that is hidden coasts for 25 images, then it is sought anew.
         """
         if len(images) != len(self.cameras):
-            raise VisionError(
-                f"PatternTracker: found {len(images)} images, expected one of each of {len(self.cameras)} cameras"
+            raise ModelError(
+                f"found {len(images)} images, expected one of each of {len(self.cameras)} cameras",
+                place="PatternTracker.update",
+                argument="images",
             )
         searched = self._state is None or self._missed > COASTED
         if searched:

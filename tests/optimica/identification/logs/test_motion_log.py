@@ -15,18 +15,18 @@ def log(t=T):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "wrong"),
     [
-        ((T, np.zeros((99, 3)), np.zeros((100, 3))), "found q of shape \\(99, 3\\).*expected \\(100, 3\\)"),
-        ((T, np.zeros((100, 3)), np.zeros((100, 2))), "found f of shape \\(100, 2\\)"),
-        ((T[:, None], np.zeros((100, 3)), np.zeros((100, 3))), "found t of shape \\(100, 1\\)"),
-        ((T, np.zeros((100, 3, 1)), np.zeros((100, 3))), "found q of shape \\(100, 3, 1\\)"),
-        ((T, [["a"]] * 100, np.zeros((100, 1))), "found q that is no array of numbers"),
+        ((T, np.zeros((99, 3)), np.zeros((100, 3))), "q"),
+        ((T, np.zeros((100, 3)), np.zeros((100, 2))), "f"),
+        ((T[:, None], np.zeros((100, 3)), np.zeros((100, 3))), "t"),
+        ((T, np.zeros((100, 3)), np.zeros((100, 3)), None, np.zeros((100, 2))), "r"),
     ],
 )
-def test_shapes_that_do_not_fit_are_refused(arguments, words):
-    with pytest.raises(ModelError, match=words):
+def test_shapes_that_do_not_fit_are_refused(arguments, wrong):
+    with pytest.raises(ModelError) as refusal:
         MotionLog(*arguments)
+    assert refusal.value.argument == wrong
 
 
 def test_a_log_is_sliced_and_cannot_be_written_to():

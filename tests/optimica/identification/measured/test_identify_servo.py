@@ -222,25 +222,24 @@ HOLE = np.where(np.arange(100) == 7, np.nan, JUMP)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "wrong"),
     [
-        ((T, JUMP, HOLE), "position that is not finite in row 7, expected numbers in every row"),
-        ((T, HOLE, JUMP), "reference that is not finite in row 7"),
-        ((np.where(T > 0.2, T + 0.001, T), JUMP, JUMP), "not evenly spaced by 0.004 s in row 51"),
-        ((T[::-1], JUMP, JUMP), "not evenly spaced"),
-        ((0 * T, JUMP, JUMP), "not evenly spaced"),
-        ((T[:50], JUMP, JUMP), r"position of shape \(100, 1\), expected \(50, 1\)"),
-        ((T, JUMP[:50], JUMP), r"reference of shape \(50, 1\), expected \(100, 1\)"),
-        ((T, np.ones((100, 2)), JUMP), r"reference of shape \(100, 2\), expected \(100, 1\)"),
-        ((T, "step", JUMP), "reference that is no array of numbers"),
-        ((T[:, None], JUMP, JUMP), r"t of shape \(100, 1\), expected \(N,\)"),
-        (([], [], []), r"t of shape \(0,\)"),
-        (([0.0], [1.0], [1.0]), "found one row, expected those of a step"),
+        ((T, JUMP, HOLE), "position"),
+        ((T, HOLE, JUMP), "reference"),
+        ((np.where(T > 0.2, T + 0.001, T), JUMP, JUMP), "t"),
+        ((T[::-1], JUMP, JUMP), "t"),
+        ((0 * T, JUMP, JUMP), "t"),
+        ((T[:50], JUMP, JUMP), "reference"),
+        ((T, np.ones((100, 2)), JUMP), "reference"),
+        ((T[:, None], JUMP, JUMP), "t"),
+        (([], [], []), "t"),
+        (([0.0], [1.0], [1.0]), "t"),
     ],
 )
-def test_what_is_no_step_response(arguments, words):
-    with pytest.raises(ModelError, match=words):
+def test_what_is_no_step_response(arguments, wrong):
+    with pytest.raises(ModelError) as refusal:
         StepResponse(*arguments)
+    assert refusal.value.argument == wrong
 
 
 @pytest.mark.parametrize(

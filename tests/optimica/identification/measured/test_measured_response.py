@@ -1,7 +1,5 @@
 """Frequency responses of measured motion, beside those of the systems that moved."""
 
-from typing import cast
-
 import numpy as np
 import pytest
 
@@ -71,25 +69,10 @@ X = np.random.default_rng(0).normal(size=(400, 2))
             "400 samples of u and 300 of y, expected as many of both, 256",
         ),
         (lambda: measured_response(X[:99], X[:99], period=0.1), "99 samples of u and 99 of y"),
-        (
-            lambda: measured_response(X, X, period=0.0),
-            "found period=0.0, expected a finite number above zero",
-        ),
-        (
-            lambda: measured_response(X, X, period=0.1, blocks=1),
-            "found blocks=1, expected a whole number from 2 on",
-        ),
         (lambda: measured_response(X, X, period=0.1, blocks=3), "blocks=3 for 2 inputs, expected 4 at least"),
-        (lambda: measured_response(X, X, period=0.1, blocks=cast(int, 2.5)), "found blocks=2.5"),
         (lambda: measured_response(0 * X, X, period=0.1), r"found that u\[0\] never changes"),
-        (lambda: measured_response(np.log(X.clip(0)), X, period=0.1), "u that is not finite in row"),
-        (lambda: measured_response("u", X, period=0.1), "found u that is no array of numbers"),
-        (
-            lambda: measured_response(X[None], X, period=0.1),
-            r"found u of shape \(1, 400, 2\), expected \(N, n\)",
-        ),
     ],
 )
 def test_what_is_no_pair_of_samples(wrong, words):
-    with pytest.raises(ModelError, match=words), np.errstate(divide="ignore"):
+    with pytest.raises(ModelError, match=words):
         wrong()

@@ -116,7 +116,6 @@ def test_the_report_says_what_is_weak(robot, tmp_path):
 @pytest.mark.parametrize(
     ("keywords", "words"),
     [
-        (dict(friction="dry"), "found friction='dry', expected one of 'symmetric'"),
         (dict(parameters="plate"), "there is no parameter 'plate'; did you mean 'plate_mass'"),
         (
             dict(parameters="plate_mass", fixed=dict(plate_mass=1)),
@@ -124,10 +123,8 @@ def test_the_report_says_what_is_weak(robot, tmp_path):
         ),
         (dict(fixed=dict(link_masses=[1, 2])), "expected a number, or one for each of link_masses[0]"),
         (dict(fixed=dict(plate_mass="heavy")), "fixed value of plate_mass is 'heavy', expected a number"),
-        (dict(minimum_speed=-1), "found minimum_speed=-1, expected a speed"),
         (dict(minimum_speed=10.0), "no joint is ever faster than minimum_speed"),
-        (dict(cutoff=0.0), "found cutoff=0.0, expected a frequency"),
-        (dict(cutoff=80.0), "less than a fifth of the log's rate of 250 Hz"),
+        (dict(cutoff=80.0), "found cutoff=80.0, expected less than a fifth of the log's rate of 250 Hz"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(robot, keywords, words):

@@ -135,10 +135,8 @@ def test_moved_resonances_begin_no_earlier():
     [
         (
             lambda: design_q(one(), limit=200.0),
-            "limit=200.0, expected Hz below half the sampling frequency, 125",
+            "limit=200.0, expected a number below 125",
         ),
-        (lambda: design_q(one(), margin=1.0), "margin=1.0, expected a number between 0 and 1"),
-        (lambda: design_q(one(), notches=-1), "notches=-1, expected a whole number from 0"),
         (lambda: design_q([]), "responses of another kind"),
         (lambda: design_q([one(), coupled(0.1)]), r"\[1, 2\] axes, expected one of both"),
         (
@@ -150,8 +148,6 @@ def test_moved_resonances_begin_no_earlier():
             "the law Gradient, expected a gain",
         ),
         (lambda: uncertain(one(), frequencies=(0.0,)), r"frequencies=\(0.0,\), expected numbers above zero"),
-        (lambda: WRONGLY(one(), frequencies="8 Hz"), "frequencies='8 Hz', expected numbers above zero"),
-        (lambda: WRONGLY("a robot"), "found the response 'a robot', expected a sampled linear system"),
         (lambda: uncertain(one(), damping=(50.0,)), "damping ratio 2, expected one below half"),
         (lambda: uncertain(one(), frequencies=(20.0,)), "becomes 160 Hz"),
         (lambda: uncertain(StateSpace(-1, 1, 1)), "found a continuous system, expected one that is sampled"),

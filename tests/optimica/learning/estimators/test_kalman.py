@@ -231,13 +231,11 @@ def rotating(radius):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: Kalman(cast(Any, "model")), "found the system 'model', expected a sampled linear one"),
+        (lambda: Kalman(cast(Any, "model")), "found system='model', expected a sampled linear one"),
         (lambda: Kalman(springs().continuous()), r"is continuous, expected a sampled one; take system\.discrete"),
         (lambda: Kalman(changed(springs(), C=np.ones((1, 6)), D=0)), "3 inputs and 1 outputs, expected from the kinematic"),
         (lambda: Kalman(changed(springs(), B=np.ones((6, 2)), D=np.zeros((3, 2)))), "2 inputs and 3 outputs"),
-        (lambda: Kalman(springs(), 0.0), "found r=0.0, expected a variance above zero"),
-        (lambda: Kalman(springs(), -1e-9), "found r=-1e-09"),
-        (lambda: Kalman(springs(), float("nan")), "found r=nan"),
+        (lambda: Kalman(springs(), 0.0), "found r=0.0, expected a number above 0"),
         (lambda: Kalman(springs(), 1e9), "no stationary filter to rounding.*take a smaller r, or more noise"),
         (lambda: Kalman(springs(), noise=0.0), "found noise=0.0, expected a deviation above zero in m/s2"),
         (lambda: Kalman(springs(), noise=np.ones((3, 3))), "or a covariance .3, 3. in m2/s4, symmetric and positive"),

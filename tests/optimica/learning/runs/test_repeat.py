@@ -1,7 +1,5 @@
 """Corrections on file, and how well a motion is repeated."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -95,10 +93,9 @@ def test_columns_in_another_order_are_found(tmp_path):
     file = history.save_corrections(tmp_path / "u.csv")
     turned = read_corrections(file, history.joints[::-1], reference.t)
     assert np.array_equal(turned, history.corrected[:, ::-1])
-    with pytest.raises(ModelError, match="runs=1, expected a whole number, 2"):
-        repeat(LinearPlant(), reference, runs=1)
-    with pytest.raises(ModelError, match=r"shape \(400, 2\), expected finite numbers, \(400, 3\)"):
+    with pytest.raises(ModelError) as refusal:
         repeat(LinearPlant(), reference, turned[:, :2])
+    assert refusal.value.argument == "corrections"
 
 
 class Bounded(Kinematics):
@@ -120,12 +117,6 @@ def test_repetitions_keep_to_limits_and_to_the_period_of_the_rig():
     with pytest.raises(ModelError, match=r"of carts\[\d\]\.s at .*within its limits, -10 to 10"):
         repeat(plant, line(), np.full((400, 3), 50.0))
     assert plant.runs == 0  # refused before it moved
-    wrong: list[Any] = [-1, 1.5, True]
-    for seed in wrong:
-        with pytest.raises(ModelError, match=r"repeat: found seed=.*expected a whole number"):
-            repeat(plant, line(), seed=seed)
-    with pytest.raises(ModelError, match=r"found corrections='u.csv', expected numbers; read the file"):
-        repeat(plant, line(), "u.csv")  # pyright: ignore[reportArgumentType]
 
 
 def test_a_repetition_that_fails_is_told_with_its_number():

@@ -115,45 +115,40 @@ def test_a_pattern_from_behind_or_behind_the_camera_is_not_seen():
 
 
 @pytest.mark.parametrize(
-    ("call", "error", "words"),
+    ("call", "words"),
     [
-        (
-            lambda: render(scene(), MIDDLE, [LENS]),  # pyright: ignore[reportArgumentType]
-            VisionError,
-            "place them by Camera.looking",
-        ),
-        (lambda: render(scene(), MIDDLE, []), VisionError, "place them by Camera.looking"),
-        (
-            lambda: render(scene(), MIDDLE, pair(), light=[Light()] * 2),
-            VisionError,
-            "found 2 lights for 1 poses",
-        ),
-        (lambda: render(scene(), [9.0, 9.0, 9.0], pair()), ModelError, "does not reach 1 of 1 poses"),
-        (lambda: render(scene(), [np.nan, 3.0, -0.6], pair()), ModelError, "not finite"),
-        (lambda: Light(-1.0), VisionError, "found gain=-1.0"),
-        (lambda: Light(bits=12), VisionError, "expected 8 or 16"),
-        (lambda: Scene(0.06), VisionError, "as Pattern.quincunx(0.06)"),  # pyright: ignore[reportArgumentType]
-        (lambda: Scene(Pattern.quincunx(0.06), place=[0.1]), VisionError, "three finite numbers in m"),
-        (lambda: Pattern.quincunx(60.0), VisionError, "lengths are in m, not mm"),
-        (lambda: Pattern.quincunx(0.0), VisionError, "above 0 in m"),
-        (lambda: Pattern("chess", 0.06), VisionError, "expected 'quincunx' or 'charuco'"),
-        (lambda: Pattern.charuco(2, 7, 0.03), VisionError, "expected whole numbers from 3"),
+        (lambda: render(scene(), MIDDLE, [LENS]), "place them by Camera.looking"),  # pyright: ignore[reportArgumentType]
+        (lambda: render(scene(), MIDDLE, []), "place them by Camera.looking"),
+        (lambda: render(scene(), MIDDLE, pair(), light=[Light()] * 2), "found 2 lights for 1 poses"),
+        (lambda: render(scene(), [9.0, 9.0, 9.0], pair()), "does not reach 1 of 1 poses"),
+        (lambda: render(scene(), [np.nan, 3.0, -0.6], pair()), "not finite"),
+        (lambda: Scene(0.06), "as Pattern.quincunx(0.06)"),  # pyright: ignore[reportArgumentType]
     ],
 )
-def test_what_cannot_be_rendered_is_refused(call, error, words):
-    with pytest.raises(error) as told:
+def test_what_cannot_be_rendered_is_refused(call, words):
+    with pytest.raises(ModelError) as told:
         call()
     assert words in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("make", "argument"),
+    [
+        (lambda: Light(-1.0), "gain"),
+        (lambda: Scene(Pattern.quincunx(0.06), place=[0.1]), "place"),
+        (lambda: Pattern.quincunx(60.0), "side"),  # in mm
+        (lambda: Pattern.charuco(2, 7, 0.03), "columns"),
+    ],
+)
+def test_numbers_of_a_scene_keep_their_limits(make, argument):
+    with pytest.raises(ModelError) as refusal:
+        make()
+    assert refusal.value.argument == argument
+
+
 def test_poses_on_file_are_checked(tmp_path):
-    with pytest.raises(VisionError, match="there is no such file"):
-        read_poses(tmp_path / "poses.csv")
     (tmp_path / "poses.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(VisionError, match="expected x,y,z,qw,qx,qy,qz in the first line"):
-        read_poses(tmp_path / "poses.csv")
-    (tmp_path / "poses.csv").write_text("x,y,z,qw,qx,qy,qz\n1,2,3\n")
-    with pytest.raises(VisionError, match="expected seven numbers in each line"):
+    with pytest.raises(ModelError, match="found no column 'x'"):
         read_poses(tmp_path / "poses.csv")
 
 
