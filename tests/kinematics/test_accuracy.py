@@ -197,6 +197,11 @@ def test_what_cannot_be_answered_is_refused(call, message):
         call()
 
 
+def test_another_model_has_no_links():
+    with pytest.raises(ModelError, match="expected a Gantry-Tau"):
+        accuracy(Kinematics(StewartPlatform(), tool="platform"), [0, 0, 0], CASE_1)
+
+
 def test_a_model_and_its_kinematics_answer_alike_and_no_poses_are_no_rows():
     r = [0.0, -4.3, 0.0]
     assert accuracy(MODEL, r, CASE_2).error == accuracy(D1, r, CASE_2).error
