@@ -263,9 +263,8 @@ def test_a_line_of_places_prints_itself():
 def test_figures(tmp_path):
     limits = Limits(strokes=(0.0, 1.2), ball_joint=0.6, obstacles=[_block()], link_radius=0.02)
     found = workspace(L1, limits, spacing=0.15)
-    for k, (axis, quantity) in enumerate(
-        [("x", "limits"), ("y", "stroke"), ("z", "angle"), ("x", "clearance")]
-    ):
+    layers: list[Any] = [("x", "limits"), ("y", "stroke"), ("z", "angle"), ("x", "clearance")]
+    for k, (axis, quantity) in enumerate(layers):
         found.plot(axis, quantity=quantity, file=tmp_path / f"{k}.png")
         assert (tmp_path / f"{k}.png").stat().st_size > 1000
     assert "m³" in found.plot_solid(file=tmp_path / "solid.png").axes[0].get_title()
