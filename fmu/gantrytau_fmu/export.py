@@ -13,7 +13,7 @@ from typing import Literal
 from gantrytau import Dae, Model, translate
 from gantrytau.border.checks import check_words, instance, number, one_of
 from gantrytau.border.refusal import Given, ModelError
-from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
+from gantrytau_fmu.building.archive import binary_members, check_target, write_archive
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
@@ -100,7 +100,7 @@ def export_fmu(
     fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
     if about.sources or not binaries:
         fmu = replace(fmu, sources=(f"sources/{COMPILED}",))
-    return write_fmu(path, _members(fmu, solver, texts, binaries))
+    return write_archive(path, _members(fmu, solver, texts, binaries))
 
 
 def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfaces, ...]:
@@ -116,8 +116,11 @@ def _translated(
     if isinstance(model, Dae):
         if given or states is not None:
             raise ModelError(
-                "found a translated model with given= or states=, expected these where it is translated; give the model "
-                "itself, or translate(model, given=..., states=...)",
+                "found a translated model with ",
+                Given("given"),
+                " or ",
+                Given("states"),
+                ", expected these where it is translated; give the model itself, or translate(model, given=..., states=...)",
                 place="export_fmu",
             )
         return model

@@ -7,6 +7,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from numbers import Real
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
@@ -99,7 +100,7 @@ def array(
     wanted = f"numbers{limits}{_in(unit)}{_shaped(shapes)}"
     try:
         values = np.asarray(_si(place, argument, found, unit) if unit else found)
-        if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and values.size):
+        if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and _numeric(values)):
             raise TypeError
         values = values.astype(float)
     except (TypeError, ValueError):
@@ -118,6 +119,12 @@ def array(
         message = f"found {argument}{where} = {values[first]}, expected finite numbers{limits}{_in(unit)}"
         raise ModelError(message, place=place, argument=argument)
     return values
+
+
+def _numeric(values: np.ndarray) -> bool:
+    """Whether an array of objects holds numbers alone: a symbol of CasADi makes a float too, nan."""
+    kinds = {type(value) for value in values.flat}
+    return bool(kinds) and all(issubclass(kind, Real) and kind is not bool for kind in kinds)
 
 
 def instance(place: str, argument: str, found: Any, kinds: Any, expected: str | None = None) -> Any:

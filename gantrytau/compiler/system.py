@@ -185,10 +185,8 @@ class _Left:
         solution: Sequence[ca.SX | None] = block.solution or [None] * len(block.tears)
         if self.form == "lifted" and block.root is not None:
             # no square root to differentiate at zero
-            w, radicand = block.root.root, block.root.radicand
-            self.algebraics.append(
-                Algebraic(w.name(), w, w**2 - radicand, ca.sqrt(ca.fmax(radicand, 0)), 0.0)
-            )
+            w, inside = block.root.root, block.root.radicand
+            self.algebraics.append(Algebraic(w.name(), w, w**2 - inside, ca.sqrt(ca.fmax(inside, 0)), 0.0))
             self.definitions.append((block.tears[0], block.root.value))
         elif block.solution is None or (self.form == "lifted" and torn_of(block)):
             rows = zip(block.tears, block.residuals, solution, strict=True)

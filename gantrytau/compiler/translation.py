@@ -240,9 +240,7 @@ def _sampled_derivatives(flat: FlatModel) -> list[str]:
     if not (flat.sampled or flat.frictions or flat.whens or flat.delays):
         return []
     used = [s.expression for s in (*flat.sampled, *flat.delays)]
-    used += [
-        e for one in flat.whens for e in (one.condition, *(v for _, v in (*one.reinits, *one.assignments)))
-    ]
+    used += [e for w in flat.whens for e in (w.condition, *(v for _, v in (*w.reinits, *w.assignments)))]
     used += [e for f in flat.frictions for e in (f.coulomb, f.smooth, f.breakaway)]
     variables = {n for v in flat.variables for n in v.elements}
     there = {leaf.name() for e in flat.equations for leaf in ca.symvar(e.residual)}

@@ -50,9 +50,7 @@ def connection_equations(
                 faces.append((path, -1 if owners[path] == where else 1))
             _check_same(pair, faces, where)
             if id(pair) in closing:
-                carried += [
-                    (face, sign, closing[id(pair)]) for face, sign in zip(faces, (1, -1), strict=True)
-                ]
+                carried += [(f, sign, closing[id(pair)]) for f, sign in zip(faces, (1, -1), strict=True)]
             else:
                 parent[find(faces[0])] = find(faces[1])
     into: dict[Face, list[tuple[int, Closure]]] = {}
@@ -114,9 +112,7 @@ def _set_equations(
         for row in range(len(columns[0])):
             element = row if len(columns[0]) > 1 else None
             if declaration.kind == "flow":
-                total = sum(
-                    (sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0)
-                )
+                total = sum((s * column[row] for s, column in zip(signs, columns, strict=True)), ca.SX(0))
                 total += sum((sign * closure.flow(name, row) for sign, closure in closures), ca.SX(0))
                 equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
             elif declaration.kind != "propagated":

@@ -18,9 +18,8 @@ from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, independent, limits_of, twists
 
-NEIGHBOURS = (
-    12  # places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
-)
+# places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
+NEIGHBOURS = 12
 ROUNDS = (32, 64, 128, 256, 512)  # places by which the branch is grown
 
 

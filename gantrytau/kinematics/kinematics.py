@@ -233,14 +233,14 @@ class Kinematics(Record):
         """
         robot = self.linked("ball_joint_angles")
         at, q, R = self._whole(robot, r, R, q, "Kinematics.ball_joint_angles")
-        default = _directions(robot, robot.home.q[None], robot.home.r[None], robot.home.R[None])
+        default = robot.geometry.link_directions(robot.home.q[None], robot.home.r[None], robot.home.R[None])
         shape, place = (len(robot.geometry.length), 3), "Kinematics.ball_joint_angles"
         given = {"cart_axes": cart_axes, "plate_axes": plate_axes}
         axes = [
             along[0] if found is None else mounting_axes(place, name, found, shape)
             for (name, found), along in zip(given.items(), default, strict=True)
         ]
-        links = _directions(robot, q, at.r, R)
+        links = robot.geometry.link_directions(q, at.r, R)
         found = np.stack([angle_between(link, axis) for link, axis in zip(links, axes, strict=True)], axis=2)
         return answered(at.one, found)[0]
 
@@ -344,15 +344,3 @@ def driven_joints(dae: Dae) -> tuple[str, ...]:
             "torques x.tau beside x.phi, where x is a component; name the actuator coordinates by joints="
         )
     return (*lengths, *angles)
-
-
-def _directions(
-    robot: RodRobot, q: np.ndarray, r: np.ndarray, R: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors of links in the axes of what carries them, and in plate axes, (N, m, 3)."""
-    _, u, _, _ = robot.geometry.slopes(q, r, R)
-    on_cart = np.empty_like(u)
-    for arm in robot.geometry.arms:
-        links = robot.geometry.links_of(arm)
-        on_cart[:, links] = u[:, links] @ robot.geometry.frames(arm, q)[1]
-    return on_cart, u @ R

@@ -48,10 +48,7 @@ def dataset(result: Series) -> "xarray.Dataset":
     variables = {}
     for name in (*result.arrays, *(name for name in result.names if name not in elements)):
         values = result[name]
-        dimensions = (
-            "time",
-            *(f"axis{k}_{n}" for k, n in enumerate(values.shape[1:])),
-        )
+        dimensions = ("time", *(f"axis{k}_{n}" for k, n in enumerate(values.shape[1:])))
         variables[name] = (dimensions, values, _attributes(result, name))
     time = ("time", result.time, {"units": "s", "long_name": "time"})
     return xarray.Dataset(variables, coords={"time": time}, attrs={"title": result.title})

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, SolveError
+from gantrytau.border.refusal import Given
 from gantrytau.border.units import given
 from gantrytau.describing.record import Record
 from gantrytau.flattening.shapes import elements_of
@@ -32,12 +33,24 @@ from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.transcription.program import Program, first_guess
 
+GUESS = "try another ", Given("guess")
 REMEDIES = {
-    "no solution: the limits contradict each other": "Widen or correct a limit named here, or try another guess=.",
-    "iteration limit reached": "Allow more with max_iterations=, or try another guess=.",
-    "time limit reached": "Allow more with max_time=, or try another guess=.",
-    "diverging: the problem may be unbounded": "Limit what runs away, or try another guess= or starts=.",
+    "no solution: the limits contradict each other": (
+        "Widen or correct a limit named here, or ",
+        *GUESS,
+        ".",
+    ),
+    "iteration limit reached": ("Allow more with ", Given("max_iterations"), ", or ", *GUESS, "."),
+    "time limit reached": ("Allow more with ", Given("max_time"), ", or ", *GUESS, "."),
+    "diverging: the problem may be unbounded": (
+        "Limit what runs away, or ",
+        *GUESS,
+        " or ",
+        Given("starts"),
+        ".",
+    ),
 }
+OTHERWISE = "Try another ", Given("guess"), ", more ", Given("elements"), ", or look at .optimum."
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,8 +150,9 @@ class Prepared(Record):
         for name, value in parameters.items():
             elements = parameter_names(self.built.read, name)
             if any(element not in held for element in elements):
+                named = Given("parameters", [name])
                 raise ModelError(
-                    f"{name}: was not named in prepare(parameters=[...]), expected one of {held}"
+                    f"expected some of {held}, as named in prepare", place=self.built.read.name, found=named
                 )
             expected = f"{len(elements)} finite numbers"
             flat = self.built.read.dae.flat
@@ -161,7 +175,7 @@ def solved_or_raise(optimum: Optimum) -> Optimum:
     solution, program = optimum.solution, optimum.program
     if solution.success:
         return optimum
-    remedy = REMEDIES.get(solution.status, "Try another guess=, more elements=, or look at .optimum.")
+    remedy = REMEDIES.get(solution.status, OTHERWISE)
     ways = f"\n{optimum.relaxed}" if worth_relaxing(program, solution) else ""
     ends = "".join(f"\n{said}" for said in held_ends(optimum.built))
-    raise SolveError(f"{optimum.report()}{ways}{ends}\n{remedy}", optimum=optimum)
+    raise SolveError(f"{optimum.report()}{ways}{ends}\n", *remedy, optimum=optimum)

@@ -78,9 +78,7 @@ def by_hand(prototype, T, q):
     quarter, carts = np.array(prototype.link_masses) / 4, np.array(prototype.cart_masses)
     M1 = (prototype.plate_mass + quarter.sum()) * np.eye(3) + (W * quarter[:, None]).T @ e
     M2 = (W * ((carts + quarter) * (e**2).sum(axis=1))[:, None]).T + (e * quarter[:, None]).T
-    G = (prototype.plate_mass + 2 * quarter.sum()) * np.array([0, 0, 1]) + W.T @ (
-        e[:, 2] * (carts + 2 * quarter)
-    )
+    G = (prototype.plate_mass + 2 * quarter.sum()) * np.eye(3)[2] + W.T @ (e[:, 2] * (carts + 2 * quarter))
     return W, M1, M2, 9.81 * G
 
 

@@ -47,9 +47,9 @@ def test_the_kinks_of_a_table_are_exact_in_time():
 def test_wrong_tables():
     for block, words in (
         (Table1([0.0, 0.0], [1.0, 2.0]), r"Table1\), equation 1: table: .*rise"),
-        (Table1([0.0, 1.0], [1.0, 2.0, 3.0]), r"found 2 numbers xs and ys of shape \(3,\)"),
-        (Table1(XS, YS, kind="cubic"), "found kind='cubic', expected one of 'linear', 'spline'"),
-        (Table2([0.0, 1.0], [0.0, 1.0], [[1.0, 2.0]]), r"found values of shape \(1, 2\), expected \(2, 2\)"),
+        (Table1([0.0, 1.0], [1.0, 2.0, 3.0]), "found ys of 3"),
+        (Table1(XS, YS, kind="cubic"), "found kind='cubic'"),
+        (Table2([0.0, 1.0], [0.0, 1.0], [[1.0, 2.0]]), "found values of"),
     ):
         with pytest.raises(ModelError, match=words):
             translate(block)

@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gantrytau import (
-    Array,
-    Fixed,
-    Input,
-    Model,
-    ModelError,
-    Start,
-    connect,
-    cos,
-    simulate,
-    sin,
-    translate,
-)
+from gantrytau import Array, Fixed, Input, Model, ModelError, Start, connect, cos, simulate, sin, translate
 from gantrytau.mechanics.filters import LowPass, coefficients
 from gantrytau_models import GantryTau, prototypes
 

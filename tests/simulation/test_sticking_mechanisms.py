@@ -3,17 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import (
-    Array,
-    Fixed,
-    Model,
-    Real,
-    StructureError,
-    connect,
-    der,
-    simulate,
-    sin,
-)
+from gantrytau import Array, Fixed, Model, Real, StructureError, connect, der, simulate, sin
 from gantrytau.mechanics import gears, rotational, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import FourBar, GantryTau, prototypes
@@ -36,11 +26,7 @@ def test_several_stick_and_slip_and_energy_balances(amplitude):
             yield der(self.lost) == sum(floor.f * floor.v for floor in self.floors)
 
     rest = [dict(s=Fixed(0.0), v=Fixed(0.0))] * 3
-    run = simulate(
-        Balanced(masses=rest, amplitude=amplitude),
-        stop=3.0,
-        tolerance=TOLERANCE,
-    )
+    run = simulate(Balanced(masses=rest, amplitude=amplitude), stop=3.0, tolerance=TOLERANCE)
     kinetic = sum(run[f"masses[{k}].v"] ** 2 for k in range(3)) / 2
     elastic = sum(200.0 * run[f"springs[{k}].s_rel"] ** 2 for k in range(2)) / 2
     balance = kinetic + elastic + run["lost"] - run["given"]
@@ -116,9 +102,7 @@ def test_carts_of_the_robot_stick_and_slip():
     run = simulate(robot, stop=1.0, parameters=hold)
     assert np.abs(run["tool.r"] - run["tool.r"][0]).max() < 1e-12
     run = simulate(
-        robot,
-        stop=1.0,
-        inputs={f"carts[{k}].f": lambda t, k=k: 400.0 * sin(6 * t + k) for k in range(3)},
+        robot, stop=1.0, inputs={f"carts[{k}].f": lambda t, k=k: 400.0 * sin(6 * t + k) for k in range(3)}
     )
     for k in range(3):
         mode, v = run[f"carts[{k}].law.mode"], run[f"carts[{k}].v"]

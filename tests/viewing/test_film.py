@@ -71,17 +71,7 @@ def test_a_lump_has_the_inertia_of_its_body():
     constants |= {f"R[{i},{j}]": float(i == j) for i in range(3) for j in range(3)}
     constants |= {f"c[{i}]": 0.1 * i for i in range(3)} | {"m": 8.0}
     lump = Lump(at=(1.0, 0.0, 0.0), R="R", mass="m", r_cm="c", J="J")
-    (solid,) = solids(
-        film_of(
-            Result(
-                [0.0],
-                constants,
-                shapes=[
-                    lump,
-                ],
-            )
-        )
-    )
+    (solid,) = solids(film_of(Result([0.0], constants, shapes=[lump])))
     edges, R = solid.size[0], solid.R[0]
     moments = 8.0 / 12 * (np.sum(edges**2) - edges**2)  # of a cuboid
     assert np.allclose(R @ np.diag(moments) @ R.T, J, rtol=1e-12)

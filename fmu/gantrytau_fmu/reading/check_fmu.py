@@ -17,7 +17,7 @@ from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.interruption import uninterrupted
 from gantrytau_fmu.building.platforms import native
-from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
+from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first, fault
 from gantrytau_fmu.reading.inconsistencies import inconsistencies
 from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
 from gantrytau_fmu.reading.safety import unpack
@@ -55,11 +55,11 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
     try:
         files = read_files(path)
         if problems := schema_problems(files):
-            return [FmuFinding("error", problem) for problem in problems]
+            return [fault(problem) for problem in problems]
         model = model_of(files)
         fmu = describe(files, model)
     except ModelError as error:
-        return [FmuFinding("error", str(error))]
+        return [fault(str(error))]
     findings = list(inconsistencies(fmu, files, model))
     for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
@@ -103,9 +103,9 @@ def _tried(path: Path, platforms: Collection[str], timeout: float) -> Iterator[F
     if finished:
         return
     if code is None:
-        yield FmuFinding("error", f"{stage}: no answer after {timeout:g} s")
+        yield fault(f"{stage}: no answer after {timeout:g} s")
     else:
-        yield FmuFinding("error", f"{stage}: the process ended ({_ending(code)})")
+        yield fault(f"{stage}: the process ended ({_ending(code)})")
 
 
 def _run_apart(arguments: list[str], folder: str, timeout: float) -> int | None:

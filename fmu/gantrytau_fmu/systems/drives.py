@@ -8,11 +8,16 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Samples
-from gantrytau.border.refusal import USERS_ERRORS, ModelError
+from gantrytau.border.refusal import USERS_ERRORS, Given, ModelError
 from gantrytau.border.units import given, scale
 from gantrytau.inputs.input_signal import with_course
 
 ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
+
+
+def wrong(argument: str, name: str, *parts: str | Given) -> ModelError:
+    """What is wrong with a value that an argument has for a name."""
+    return ModelError(*parts, place=f"{argument}: {name}", argument=argument)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +63,7 @@ def drives_of(argument: str, name: str, value: Any, count: int, span: tuple[floa
     except ModelError as error:
         raise error.within(argument) from error
     if isinstance(course, Samples):
-        return _samples(f"{argument} {name}", course, count, span)
+        return _samples(f"{argument}: {name}", course, count, span)
     if callable(course):
         return _functions(argument, name, course, count, span[0])
     return [Drive(lambda t, x=number: x) for number in numbers_of(argument, name, course, count)]
@@ -75,22 +80,19 @@ def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
     )
     if samples is None and not texts:
         return value
-    place = f"{argument} {name}"
     try:
         own = scale(unit) if unit else None
     except ModelError:
-        raise ModelError(
-            f"{place}: found {value!r}, expected numbers in '{unit}', the unit of this FMU; convert them",
-            argument=argument,
-        ) from None
+        expected = f"expected numbers in '{unit}', the unit of this FMU; convert them"
+        raise wrong(argument, name, f"found {value!r}, {expected}") from None
     coherent = None if own is None else unit if own.slope == 1.0 and not own.zero else own.coherent
     try:
         if samples is None:
-            found = given(place, value, coherent)
+            found = given(name, value, coherent)
             return found if own is None else own.written(np.asarray(found, dtype=float))
-        samples.check_unit(place, coherent)
+        samples.check_unit(name, coherent)
     except ModelError as error:
-        raise ModelError(str(error), argument=argument) from None
+        raise ModelError(str(error), place=argument, argument=argument) from None
     values = samples.values if own is None else own.written(samples.values)
     shaped = values.reshape(samples.times.size, *samples.shape, order="F")
     return Samples(samples.times, shaped, kind=samples.kind, largest_gap=samples.largest_gap)
@@ -101,14 +103,10 @@ def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:
     try:
         numbers = np.asarray(value, dtype=float).ravel()
     except (TypeError, ValueError):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected a number or an array", argument=argument
-        ) from None
+        raise wrong(argument, name, f"found {value!r}, expected a number or an array") from None
     if numbers.size != count or not np.all(np.isfinite(numbers)):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected {count} finite number{'s' * (count > 1)}",
-            argument=argument,
-        )
+        expected = f"expected {count} finite number{'s' * (count > 1)}"
+        raise wrong(argument, name, f"found {value!r}, {expected}")
     return [float(number) for number in numbers]
 
 
@@ -121,11 +119,9 @@ def _functions(
         try:
             found = function(t)
         except USERS_ERRORS as error:  # whatever a function of the user raises
-            raise ModelError(
-                f"the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value at every "
-                "time of the simulation",
-                place=f"{argument} {name}",
-                argument=argument,
+            failed = f"the function failed at t = {t:.6g} s with {type(error).__name__}: {error}"
+            raise wrong(
+                argument, name, f"{failed}; expected a value at every time of the simulation"
             ) from error
         return numbers_of(argument, f"{name} at t = {t:.6g} s", found, count)
 

@@ -207,10 +207,7 @@ def _functions(
     strata: Strata, pieces: Mapping[str, tuple[Cut, list[ca.SX]]], *, by_value: bool
 ) -> dict[str, ca.Function]:
     """The pieces as functions of what is known and the parameters; by_value: right where pivots vanish, too."""
-    found = {
-        name: cut.function(name, expressions, by_value=by_value)
-        for name, (cut, expressions) in pieces.items()
-    }
+    found = {name: cut.function(name, e, by_value=by_value) for name, (cut, e) in pieces.items()}
     n = len(strata.roles["T"])
     for name in ("constraints", "balance"):
         if found[name].size1_out(0) != n:

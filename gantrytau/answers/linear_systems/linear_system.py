@@ -108,9 +108,7 @@ class LinearSystem(Record):
         for a pole at zero or on the negative real axis, which no continuous system of this order has.
         """
         if self.period is None:
-            raise ModelError(
-                f"{self.title}: found a continuous system, expected one with a period; take it as it is"
-            )
+            raise ModelError(f"{self.title}: found a continuous system, expected one with a period")
         poles = self.poles
         real = np.abs(np.imag(poles)) <= ROUNDING * np.abs(poles)
         strange = poles[real & (np.real(poles) <= ROUNDING)]
@@ -147,9 +145,8 @@ class LinearSystem(Record):
                 )
             return stepped(self.A, self.B, self.C, self.D, checked_inputs(name, u, len(self.inputs)), start)
         if not (isinstance(u, tuple) and len(u) == 2):
-            raise ModelError(
-                f"{name}: found {type(u).__name__}, expected (times, values): the system is continuous"
-            )
+            words = f"found {type(u).__name__}, expected (times, values): the system is continuous"
+            raise ModelError(words, place=name)
         values = checked_inputs(name, u[1], len(self.inputs))
         times = array(name, "times", u[0], (len(values),))
         if not np.all(np.diff(times) > 0):

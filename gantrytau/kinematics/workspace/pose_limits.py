@@ -218,18 +218,10 @@ class Examiner:
         if self._axes is None:
             return np.where(np.isnan(q[:, 0]), np.nan, np.inf)
         angles = [
-            angle_between(u, axes) for u, axes in zip(self._directions(q, r, R), self._axes, strict=True)
+            angle_between(u, axes)
+            for u, axes in zip(self.geometry.link_directions(q, r, R), self._axes, strict=True)
         ]
         return self.limits.ball_joint - np.max(angles, axis=(0, 2)) - self.limits.angle_margin
-
-    def _directions(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vectors along the links from cart to plate in the axes of what carries them, and in plate axes, (N, m, 3)."""
-        u = self.geometry.plate_joints(r, R) - self.geometry.cart_joints(q)
-        on_cart = np.empty_like(u)
-        for arm in range(self.carts):
-            links = self.geometry.links_of(arm)
-            on_cart[:, links] = u[:, links] @ self.geometry.frames(arm, q)[1]
-        return on_cart, u @ R
 
     def _joint_axes(self) -> list[np.ndarray]:
         """Axes of the ball joints on carts and on the plate, (m, 3) each: as given, or along the links at home."""
@@ -237,7 +229,7 @@ class Examiner:
         r = home.r if self.limits.home is None else self.limits.home
         at = poses(r, None, f"{self.name}: Limits.home").r[:1]
         q, R = self._joints_and_orientation(at, None)
-        usual = [directions[0] for directions in self._directions(q, at, R)]
+        usual = [directions[0] for directions in self.geometry.link_directions(q, at, R)]
         found = []
         for name, along in zip(("cart_axes", "plate_axes"), usual, strict=True):
             given = getattr(self.limits, name)

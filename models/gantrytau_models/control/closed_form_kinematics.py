@@ -25,9 +25,7 @@ class ArmGeometry(Model):
     length = Parameter(1.0, unit="m", min=0.0, description="length of the link")
     offset = Parameter([0.0, 0.0, 0.0], unit="m", description="cart at s = 0, less the joint on the plate")
     direction = Parameter(
-        [1.0, 0.0, 0.0],
-        unit="1",
-        description="axis of the guideway; its length is the transmission factor",
+        [1.0, 0.0, 0.0], unit="1", description="axis of the guideway; its length is the transmission factor"
     )
 
 

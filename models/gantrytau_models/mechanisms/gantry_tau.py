@@ -5,13 +5,14 @@ between the cart and the tool; that the plate keeps its orientation is modelled 
 prismatic joints in series.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
 from gantrytau.border.refusal import ModelError, short
-from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Slideway
+from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Shape, Slideway
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
@@ -58,7 +59,7 @@ class Arm(Model):
         yield connect(self.link.frame_b, self.frame_b)
         yield connect(self.rail.axis, self.axis)
 
-    def shapes(self):
+    def shapes(self) -> Iterator[Shape]:
         yield Slideway(at="rail.frame_a.r", direction="direction", coordinate="rail.s", R="frame_a.R")
 
 
@@ -155,17 +156,22 @@ class GantryTau(Model):
             yield connect(arm.frame_b, self.tool.frame)
 
     def shapes(self):
-        for i in range(3):
-            arm, cart = f"arms[{i}]", f"carts[{i}]"
-            yield ForceArrow(
-                owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"{arm}.direction"
-            )
+        yield from forces_on_carts()
 
     def rods(self) -> Rods:
         """The links, one on each arm: their joints on the plate are in its tool point, as offsets say (4.7)."""
         names = [(f"arms[{i}]", f"carts[{i}].s") for i in range(3)]
         return Rods(
             [RodArm(a, s, f"{a}.direction", f"{a}.offset", [SingleRod(f"{a}.length")]) for a, s in names]
+        )
+
+
+def forces_on_carts() -> Iterator[ForceArrow]:
+    """The actuator forces on three carts, as pictures show them."""
+    for i in range(3):
+        cart = f"carts[{i}]"
+        yield ForceArrow(
+            owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"arms[{i}].direction"
         )
 
 

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.optimum import Optimum
@@ -166,8 +167,7 @@ class ParameterFit(Record):
         """
         from scipy import stats
 
-        if not isinstance(confidence, float) or not 0 < confidence < 1:
-            raise ModelError(f"intervals: found confidence={confidence!r}, expected a number between 0 and 1")
+        number("intervals", "confidence", confidence, above=0.0, below=1.0)
         wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)
         half = float(wide.ppf((1 + confidence) / 2))
         return {

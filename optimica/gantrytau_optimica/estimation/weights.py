@@ -60,7 +60,7 @@ class Weighing:
         return Weights.even(self.outputs.size)
 
     def weights(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> Weights:
-        """Weights that the residuals (N,) with slopes (N, k) ask for; before: those they were fitted with."""
+        """Weights that the residuals (N,) with the Jacobian (N, k) ask for; before: those they were fitted with."""
         noise = before.noise if self.known else self._noise(errors, jacobian, before)
         if self.loss == "squares":
             return Weights(noise, before.huber)
@@ -79,8 +79,8 @@ class Weighing:
         return np.maximum(found, LEAST)[self.outputs]
 
 
-def _told(slopes: np.ndarray) -> np.ndarray:
-    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the slopes."""
-    norms = np.linalg.norm(slopes, axis=0)
-    basis, singular, _ = np.linalg.svd(slopes / np.where(norms > 0, norms, 1.0), full_matrices=False)
+def _told(jacobian: np.ndarray) -> np.ndarray:
+    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the Jacobian."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    basis, singular, _ = np.linalg.svd(jacobian / np.where(norms > 0, norms, 1.0), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)

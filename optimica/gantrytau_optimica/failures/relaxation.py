@@ -125,18 +125,8 @@ def _other_duration(program: Program, w: np.ndarray, end: float) -> Concession |
     variant = transcribed_again(program, changed)
     place = len(problem.free)
     name = f"final_time = {stop:g}"
-    soft = Soft(
-        name,
-        False,
-        np.array([place]),
-        stop,
-        stop,
-        span,
-        variant.places.scale[place],
-        1.0,
-        np.array([np.nan]),
-        -1,
-    )
+    scale, where, never = variant.places.scale[place], np.array([place]), np.array([np.nan])
+    soft = Soft(name, False, where, stop, stop, span, scale, 1.0, never, -1)
     found = Elastic(variant, [soft]).solve(np.insert(w, place, stop), [0], end)
     if found is None or found[1][0] < SMALL:
         return None

@@ -60,6 +60,9 @@ class Finding(Record):
     def __str__(self) -> str:
         return f"{self.kind}: {self.message}"
 
+    def __repr__(self) -> str:
+        return f"Finding(kind={self.kind!r}, message={self.message!r})"
+
 
 def in_lines(parts: Sequence[Part], rows: np.ndarray, lines: np.ndarray) -> list[Part]:
     """A sentence with lines in place of rows; a few rows that it does not name are added at its end."""

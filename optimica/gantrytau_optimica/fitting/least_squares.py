@@ -145,9 +145,11 @@ class _Problem:
         self.free = scale > 0
         self.scale = scale[self.free]
         self._residuals, self._jacobian = residuals, jacobian
-        join = [np.concatenate([np.asarray(getattr(p, part), kind) for p in priors] or [np.zeros(0, kind)])
-                for part, kind in (("indices", int), ("values", float), ("weights", float))]  # fmt: skip
-        self._indices, self._values, self._weights = join
+        rows = [
+            (int(i), m, w) for p in priors for i, m, w in zip(p.indices, p.values, p.weights, strict=True)
+        ]
+        self._indices = [i for i, _, _ in rows]
+        self._values, self._weights = (np.array([row[k] for row in rows], dtype=float) for k in (1, 2))
         self._rows = np.eye(len(scale))[self._indices] * self._weights[:, None]
 
     def residuals(self, x: np.ndarray) -> np.ndarray:

@@ -42,7 +42,7 @@ def tukey_roots(sizes: np.ndarray) -> np.ndarray:
 
 
 def without_strays(left: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-    """What a fit that strays do not lead would leave (N,), from what least squares leave (N,) and their slopes (N, k).
+    """What a fit that strays do not lead would leave (N,), from what least squares leave (N,) and their Jacobian (N, k).
 
     Tukey's bisquare from the median of the amounts, to first order.
     """

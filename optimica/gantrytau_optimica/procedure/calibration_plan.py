@@ -13,7 +13,7 @@ from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.procedure.documents.files import plan_on_file, write_plan
-from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.documents.rapid import OPERATOR, RapidOptions, rapid_program
 from gantrytau_optimica.procedure.monte_carlo import matched, placed
 from gantrytau_optimica.procedure.motion_planning.plan_motion import plan_motion
 from gantrytau_optimica.procedure.motion_planning.tours import Roadmap, find_tour
@@ -42,9 +42,7 @@ class CalibrationPlan(PosePlan):
         only tells and goes on after `measure`, and so does the name of a digital output, which gets a pulse too; tool:
         name of its tool data. Raises ModelError for words that RAPID does not take.
         """
-        return rapid_program(
-            self, name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
-        )
+        return rapid_program(self, RapidOptions(name, speed, settle, measure, carts, trigger, tool))
 
     def motion(self, *, speed: float = 0.1, rest: float = 3.0) -> Result:
         """The nominal robot on its way through the poses, which `animate(plan)` shows, with obstacles and places to measure.
@@ -69,7 +67,7 @@ class CalibrationPlan(PosePlan):
         program: as of `program`; its name is that of the file, Calibration.mod. Returns the folder, which is made where
         it does not exist; ModelError where the folder around it does not.
         """
-        return write_plan(self, Path(folder), program)
+        return write_plan(self, Path(folder), RapidOptions(**program))
 
     def placed(self, measurements: Measurements) -> Measurements:
         """Measurements in any frame, such as the axes of the device, laid over the poses that are expected, by their q."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import permutations
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +20,7 @@ from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
 from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.mistakes import mistakes
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.tool_error import ToolError, tool_error
@@ -232,10 +232,9 @@ def _rows(planned: PlannedCell, data: Measurements) -> np.ndarray:
     good = data.finite
     if np.count_nonzero(rows[good] >= 0) >= min(FEW, np.count_nonzero(good)):
         return rows
-    words = next((words for words, other in _mistakes(q) if np.mean(matched(other, expected) >= 0) > 0.5), "")
+    words = _mistake(data, expected, plan.carts) or "q1, q2, ... must be those of poses.csv"
     raise ModelError(
-        f"found no actuator positions of the plan beside it; {words or 'q1, q2, ... must be those of poses.csv'}; for "
-        "measurements of other poses name the robot, ",
+        f"found no actuator positions of the plan beside it; {words}; for measurements of other poses name the robot, ",
         Given("robot", planned.cell.name),
     )
 
@@ -258,22 +257,13 @@ def _by_number(planned: PlannedCell, data: Measurements) -> np.ndarray:
     return np.where(off > FAR, -1, rows)
 
 
-def _mistakes(q: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """What may have been done to q, and q with that undone."""
-    yield "they are in mm, expected m", q * 1e-3
-    columns = range(q.shape[1])
-    for order in permutations(columns) if len(columns) <= FEW else _swaps(len(columns)):
-        words = [f"q{k + 1} stands in column q{c + 1}" for k, c in enumerate(order) if k != c]
-        if words:
-            yield ", ".join(words), q[:, list(order)]
-
-
-def _swaps(count: int) -> Iterator[list[int]]:
-    for i in range(count):
-        for k in range(i + 1, count):
-            order = list(range(count))
-            order[i], order[k] = k, i
-            yield order
+def _mistake(data: Measurements, expected: np.ndarray, carts: int) -> str:
+    """The mistake in q alone without which most rows are planned poses; nothing where there is none."""
+    for mistake in mistakes(carts, data.q.shape[1] - carts, turns=False):
+        q, r, _ = mistake.undo(data.q, data.r, None)
+        if np.array_equal(r, data.r, equal_nan=True) and np.mean(matched(q, expected) >= 0) > 0.5:
+            return f"undo this: {mistake.words}"
+    return ""
 
 
 def _told(q: np.ndarray) -> str:

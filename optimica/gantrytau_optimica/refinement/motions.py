@@ -90,21 +90,21 @@ def _doubtful(trajectory: Trajectory) -> bool:
         followed = np.linalg.solve(rows[:, n:, n + 1 :], rows[:, n:, : n + 1])
     except np.linalg.LinAlgError:
         return True
-    rows = rows[:, :n, : n + 1] - rows[:, :n, n + 1 :] @ followed  # rates, and their slopes by states
+    rows = rows[:, :n, : n + 1] - rows[:, :n, n + 1 :] @ followed  # rates, and their Jacobian by states
     rows = rows.reshape(mesh.elements, PLACES.size, n, n + 1)
     spans = np.diff(trajectory.times(mesh.borders))[:, None, None]
-    slopes = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
+    jacobian = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
     x = signals[:n].reshape(n, mesh.elements, PLACES.size).transpose(1, 2, 0)
     rests = x[:, :1] + INTEGRALS @ rows[..., 0] * spans - x
     grown = np.einsum(
-        "epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
+        "epij,epj,p->ei", expm(jacobian[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
     )
-    misses = rests[:, -1] + np.einsum("eij,ej->ei", slopes, grown)
+    misses = rests[:, -1] + np.einsum("eij,ej->ei", jacobian, grown)
     sizes = np.array([s.nominal for s in phase.states])
     if np.all(np.abs(misses) <= RESOLVED * sizes):
         return False
     off = np.zeros(n)
-    for growth, miss in zip(expm(slopes), misses, strict=True):
+    for growth, miss in zip(expm(jacobian), misses, strict=True):
         off = growth @ off + miss
     return not np.all(np.abs(off) <= DOUBTFUL * sizes)
 

@@ -24,9 +24,8 @@ REPLAYED = 1e-7  # relative: what tolerances of solver and integration leave in 
 ZOOMS = 1  # rounds that look closer at where arcs end, before borders stand there
 WORSE = 1e-3  # relative: an objective by which another branch, or none, was found
 LEAST_CHANGE = 1e-12  # of the objective, by rounding: the mesh is as it was
-SMALL = (
-    30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
-)
+# times the accuracy: defects below which borders may move; above, they would be moved to err more
+SMALL = 30.0
 
 
 @dataclass(frozen=True)

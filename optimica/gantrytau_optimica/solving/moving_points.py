@@ -133,8 +133,8 @@ def _shares(program: Program, moving: Sequence[_Moving], w: np.ndarray) -> tuple
     function = ca.Function(
         "shares", [numbers], [ca.densify(shares), ca.densify(ca.jacobian(shares, numbers))]
     )
-    share, slope = (np.array(x) for x in function(w[free]))
-    return np.clip(share.ravel(), 0.0, 1.0), slope * program.places.scale[free]
+    share, gradient = (np.array(x) for x in function(w[free]))
+    return np.clip(share.ravel(), 0.0, 1.0), gradient * program.places.scale[free]
 
 
 def _elements(program: Program, moving: Sequence[_Moving], w: np.ndarray) -> list[int]:
@@ -161,12 +161,12 @@ def _moved(program: Program, one: _Moving, element: int, w: np.ndarray) -> np.nd
     w, free, scale = w.copy(), program.places.free, program.places.scale
     low, high = program.lbw[free] * scale[free], program.ubw[free] * scale[free]
     for _ in range(3):
-        (share,), (slope,) = _shares(program, [one], w)
-        slope = np.where(low < high, slope, 0.0)
+        (share,), (gradient,) = _shares(program, [one], w)
+        gradient = np.where(low < high, gradient, 0.0)
         step = (
-            slope
+            gradient
             * ((borders[element] + borders[element + 1]) / 2 - share)
-            / max(float(slope @ slope), 1e-300)
+            / max(float(gradient @ gradient), 1e-300)
         )
         w[free] = np.clip(w[free] + step * scale[free], low, high)
     return w

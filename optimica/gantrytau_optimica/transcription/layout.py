@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Signal
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
@@ -231,10 +232,8 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
         if signal.pieces.kind == "free":
             continue
         if mesh.moving and signal.pieces.kind == "linear" and signal.pieces.elements > 1:
-            raise ModelError(
-                f"controls {signal.name}: straight lines over several elements and lengths='free' do not go together; "
-                "take elements=1 or give the lengths"
-            )
+            why = "expected 'given' beside straight lines over several elements; give the lengths, or elements=1 there"
+            raise ModelError(why, place=f"controls {signal.name}", found=Given("lengths", "free"))
         tracks[i], new = pieces_of(signal, mesh, first + owner.size)
         if signal.pieces.kind != "ramps":
             chains[i] = first + owner.size + np.arange(new.size)

@@ -87,9 +87,8 @@ def with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
         return mesh
     if mesh.moving:
         name = next(course.name for course in phase.courses if course.jumps.size)
-        raise ModelError(
-            f"{name}: its steps and lengths='free' do not go together, as borders stand at the steps; give the lengths"
-        )
+        why = "expected 'given', as borders stand at the steps of this input"
+        raise ModelError(why, place=name, found=Given("lengths", "free"))
     start, final = float(phase.start_time), float(phase.final_time)
     return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
 

@@ -138,17 +138,9 @@ def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[l
     """The conditions on values at single times, the last rows of every program, from row `start` on."""
     boundary = places.problem.boundary
     rows = start + np.arange(len(boundary))
+    never = np.array([np.nan])
     groups = [
-        Rows(
-            "boundary",
-            limit.name,
-            -1,
-            np.array([row]),
-            np.array([np.nan]),
-            limit.lower,
-            limit.upper,
-            limit.size,
-        )
+        Rows("boundary", limit.name, -1, np.array([row]), never, limit.lower, limit.upper, limit.size)
         for row, limit in zip(rows, boundary, strict=True)
     ]
     if not boundary:

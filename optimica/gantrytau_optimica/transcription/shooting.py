@@ -26,6 +26,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.transcription.assemble import Term, assemble
@@ -142,10 +143,8 @@ def shoot(
     )
     moving = next((one for one in where if one.place is None), None)
     if moving is not None:
-        raise ModelError(
-            f"{problem.name}: at({moving.point.time}, ...): this share of the horizon changes with free numbers, which "
-            "scheme='shooting' cannot follow; use scheme='radau'"
-        )
+        where = f"at({moving.point.time}, ...): this share of the horizon changes with free numbers; take "
+        raise ModelError(where, Given("scheme", "radau"), place=problem.name, argument="scheme")
     groups: list[Rows] = []
     linear: list[Sparse] = []
     parts: list[tuple[ShootingLayout, list[Limit], int, int]] = []

@@ -21,9 +21,7 @@ def random_system(seed, n=5, m=2, k=3):
 def test_oscillator_has_the_poles_and_the_damping_of_the_textbook():
     system = StateSpace(*OSCILLATOR)
     w, zeta = 5.0, 0.15
-    assert system.poles == pytest.approx(
-        w * (-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([-1, 1])), rel=1e-14
-    )
+    assert system.poles == pytest.approx(w * (-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([-1, 1])), 1e-14)
     assert system.damping == pytest.approx([zeta, zeta], rel=1e-13)
     assert system.eigenfrequencies == pytest.approx([w / (2 * np.pi)] * 2, rel=1e-14)
     assert system.zeros.size == 0
@@ -92,9 +90,7 @@ def test_zeros_of_a_system_with_feedthrough_and_of_several_inputs():
     A, B, C, D = random_system(5, m=2, k=2)
     # where D is regular they are the poles of the inverse
     expected = np.linalg.eigvals(A - B @ np.linalg.solve(D, C))
-    assert np.sort_complex(StateSpace(A, B, C, D).zeros) == pytest.approx(
-        np.sort_complex(expected), rel=1e-10
-    )
+    assert np.sort_complex(StateSpace(A, B, C, D).zeros) == pytest.approx(np.sort_complex(expected), 1e-10)
     blocked = StateSpace(A, B, C, D).zeros
     for z in blocked:  # each makes the system matrix lose rank
         whole = np.block([[A - z * np.eye(5), B], [C, D]])

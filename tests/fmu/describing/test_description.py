@@ -272,10 +272,7 @@ def with_lists(**changes):
         (with_variable(1, type="Int32", start=2**31), "start is 2147483648"),
         (with_variable(7, type="Int32"), "'share': an integer cannot be continuous"),
         (with_variable(7, causality="local"), "'share': expected each output once"),
-        (
-            with_variable(7, derivative="m"),
-            "'share' is the derivative of 'm', expected a continuous variable",
-        ),
+        (with_variable(7, derivative="m"), "'share' is the derivative of 'm', expected a continuous"),
         (with_variable(6, derivative=None), r"'der\(v\)' is listed as a derivative, but of no state"),
         (with_variable(6, derivative="s"), "state 's' has two derivatives"),
         (
@@ -284,10 +281,7 @@ def with_lists(**changes):
         ),
         (with_lists(outputs=()), "'s', 'share': expected each output once"),
         (with_lists(derivatives=(Unknown("v", ()),) * 2), "'v' stands twice in the list of derivatives"),
-        (
-            with_lists(derivatives=(Unknown("v", ("w",)),)),
-            "unknown 'v': 'w': expected names of variables",
-        ),
+        (with_lists(derivatives=(Unknown("v", ("w",)),)), "unknown 'v': 'w': expected names of variables"),
         (with_lists(derivatives=(Unknown("v", ("s",), ()),)), "1 dependencies .* and 0 kinds"),
         (with_lists(derivatives=(Unknown("v", ("s", "s")),)), "each once"),
         (

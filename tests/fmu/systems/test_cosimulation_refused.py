@@ -43,7 +43,7 @@ def run(files, **policy):
         (dict(tolerance=2.0), "tolerance", "below 1"),
         (dict(start={"a.q": 1.0}), "start", r"a has no variable 'q'"),
         (dict(start={"a.k": np.nan}), "start", r"a\.k: found nan"),
-        (dict(start={"a.x": 1.0}), "start", r"a\.x is a continuous output .*, of which this FMU has none"),
+        (dict(start={"a.x": 1.0}), "start", r"a\.x: a continuous output .*, of which this FMU has none"),
         (dict(start={"a.k.start": 1.0}), "start", r"a\.k\.start: .*; in an FMU it is called 'a\.k'"),
         (dict(start={"a.q.start": 1.0}), "start", r"a\.q\.start: a has no variable 'q\.start'"),
         (dict(inputs={"a.qq": 1.0}), "inputs", r"a\.qq: a has no variable 'qq'; its inputs are f\."),
@@ -70,11 +70,11 @@ def test_wrong_settings_are_refused(halves, policy, argument, words):
         (([0.0, 0.5], [0.0, 1.0]), r"samples cover 0 to 0\.5 s, expected 0 to 1 s"),
         (([0.0, 2.0], [0.0]), r"input a\.f: Samples: found times of shape \(2,\) and values of shape \(1,\)"),
         (([1.0, 0.0], [0.0, 1.0]), r"input a\.f: Samples: the time falls from 1 s in row 0 to 0 s"),
-        (lambda t: np.nan, r"inputs a\.f at t = 0 s: found nan"),
-        ("much", r"inputs a\.f: found 'much', expected a number"),
+        (lambda t: np.nan, r"inputs: a\.f at t = 0 s: found nan"),
+        ("much", r"inputs: a\.f: found 'much', expected a number"),
         (
             lambda t: 1 / (t - 0.45),
-            r"inputs a\.f: the function failed at t = 0\.45 s with ZeroDivisionError: .*; expected a value at every",
+            r"inputs: a\.f: the function failed at t = 0\.45 s with ZeroDivisionError: .*; expected a value at every",
         ),
     ],
 )

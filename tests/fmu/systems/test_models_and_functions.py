@@ -87,15 +87,9 @@ def test_vectors_and_parameters_come_by_name(tank):
 REFUSED = [
     (lambda t, v: {"v": 1.0}, "law: the function <lambda> answered ['v'], expected {name: value} of u"),
     (lambda t, v: 3.0, "law: the function <lambda> answered 3.0, expected {name: value} of u"),
-    (
-        lambda t, v: {"u": [1.0, 2.0]},
-        "law: the function <lambda> answered u = [1.0, 2.0], expected numbers, 1",
-    ),
+    (lambda t, v: {"u": [1.0, 2.0]}, "law: the function <lambda> answered u = [1.0, 2.0], expected"),
     (lambda t, v: {"u": "fast"}, "law: the function <lambda> answered u = 'fast', expected numbers, 1"),
-    (
-        lambda t, v: {"u": 1 / 0},
-        "law: the function <lambda> raised ZeroDivisionError: division by zero; mend it",
-    ),
+    (lambda t, v: {"u": 1 / 0}, "law: the function <lambda> raised ZeroDivisionError: division by zero;"),
     (lambda t, v: {"u": math.nan}, "law: found law.u = nan at t = 0.1 s, expected finite values"),
 ]
 
@@ -113,10 +107,7 @@ def test_what_a_function_does_wrong_is_said_with_its_name_and_time(tank, functio
     [
         (Master(isolate=True), "isolate: law is a Python function, expected an FMU"),
         (Master(isolate=["law"]), "isolate: law is a Python function, expected an FMU"),
-        (
-            Master(error_estimate=True),
-            "error_estimate: law is a Python function, which a second run would find",
-        ),
+        (Master(error_estimate=True), "error_estimate: law is a Python function, which a second run would"),
         (Master(order="iterate"), "law: law cannot save and restore its state, which order='iterate' needs"),
     ],
 )

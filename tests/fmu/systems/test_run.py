@@ -101,7 +101,7 @@ def test_a_failing_run_saves_what_there_is(build, tmp_path):
     ("arguments", "words"),
     [
         (["--set", "q=1"], "q: lag.fmu has no variable 'q'; there is u, k, y."),
-        (["--set", "y=1"], "y is a continuous output that is calculated, expected a parameter, an input"),
+        (["--set", "y=1"], "a continuous output that is calculated, expected a parameter, an input"),
         (["--input", "uu=1"], "uu: lag.fmu has no variable 'uu'; did you mean 'u'?"),
         (["--step", "0"], "--step 0.0: expected more than 0 and at most the 1 s that are simulated"),
         (["--order", "jakobi"], "'jakobi' is not one of"),

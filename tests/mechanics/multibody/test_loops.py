@@ -25,9 +25,8 @@ from tests.mechanisms.rows import row
 from tests.references import four_bar
 from tests.references.rotations import turn
 
-ROUNDING = (
-    1e-9  # of blocks that are solved after a Newton iteration to 1e-13, with condition numbers up to 1e3
-)
+# of blocks that are solved after a Newton iteration to 1e-13, with condition numbers up to 1e3
+ROUNDING = 1e-9
 NORMAL = [0.0, 0.0, 1.0]
 
 

@@ -7,12 +7,7 @@ from gantrytau import ModelError, translate
 from gantrytau_models import ForwardKinematics, GantryTau, InverseKinematics, prototypes
 from tests.models.mechanisms.test_gantry_tau import CARTS, mapped, random_motions, symmetric
 
-ROBOTS = {
-    "L1": prototypes.L1,
-    "D1": prototypes.D1,
-    "GT_A": prototypes.GT_A,
-    "symmetric": symmetric(),
-}
+ROBOTS = {"L1": prototypes.L1, "D1": prototypes.D1, "GT_A": prototypes.GT_A, "symmetric": symmetric()}
 
 
 @pytest.fixture(params=ROBOTS)

@@ -5,17 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from gantrytau import (
-    Model,
-    ModelError,
-    Parameter,
-    Real,
-    Samples,
-    der,
-    linearize,
-    simulate,
-    translate,
-)
+from gantrytau import Model, ModelError, Parameter, Real, Samples, der, linearize, simulate, translate
 from gantrytau.mechanics.translational import Position
 from gantrytau_models import CartServo, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_models.control.servos import moved_masses

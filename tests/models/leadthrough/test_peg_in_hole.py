@@ -8,11 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import ModelError, simulate, study, translate
 from gantrytau_models.leadthrough.peg_control import PegControl
-from gantrytau_models.leadthrough.peg_figures import (
-    plot_peg_forces,
-    plot_peg_orientation,
-    plot_peg_torques,
-)
+from gantrytau_models.leadthrough.peg_figures import plot_peg_forces, plot_peg_orientation, plot_peg_torques
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole, peg_disturbances
 from gantrytau_models.leadthrough.peg_match import Match
 

@@ -215,5 +215,5 @@ def test_a_known_input_may_hold_a_parameter_of_the_fit():
 
 def test_free_lengths_beside_a_known_input_with_steps():
     """Borders at the steps and borders that move do not go together, as samples of straight lines are refused."""
-    with pytest.raises(ModelError, match=r"model\.u: its steps and lengths='free' do not go together"):
+    with pytest.raises(ModelError, match=r"model\.u: found lengths='free', expected 'given', as borders"):
         optimize(problem(Held, inputs={"model.u": STEPS}), elements=4, lengths="free")

@@ -90,7 +90,7 @@ def test_a_parameter_at_its_limit_is_named_and_left_out():
         fit.covariance(["z"])
     with pytest.raises(ModelError, match=r"write \['k'\]"):
         fit.covariance("k")
-    with pytest.raises(ModelError, match="confidence=95, expected a number between 0 and 1"):
+    with pytest.raises(ModelError, match="confidence=95, expected a number above 0 and below 1"):
         fit.intervals(95)  # pyright: ignore[reportArgumentType]
 
 
@@ -139,9 +139,7 @@ def test_what_does_not_fit(experiment, parameters, words):
 
 
 def test_starts_and_inputs_that_are_missing():
-    with pytest.raises(
-        ModelError, match=r"1 initial values are neither given nor estimated \(experiment_1: y\)"
-    ):
+    with pytest.raises(ModelError, match=r"1 initial values are neither given nor estimated"):
         estimate(Trend, {"slope": 1.0}, DATA)
     levels = (TIMES, 0.06 + 0.001 * FADING)
     with pytest.raises(ModelError, match="the input u2 of experiment_1 is not known"):
@@ -164,8 +162,6 @@ def test_times_that_are_no_times():
             Experiment({"y": (times, [1.0, 2.0, 3.0])})
     with pytest.raises(ModelError, match="expected the first to be the smaller"):
         Experiment({"y": (TIMES, FADING)}, begin=5.0)
-    with pytest.raises(ModelError, match="stop='soon', expected a time"):
-        Experiment({"y": (TIMES, FADING)}, stop="soon")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ModelError, match="found nothing measured"):
         Experiment({})
     with pytest.raises(ModelError, match=r"measured y: found 3\.0"):
@@ -179,7 +175,5 @@ def test_times_that_are_no_times():
 def test_calls_that_make_no_sense():
     with pytest.raises(ModelError, match="expected a Model"):
         estimate("Decay", {"k": 1.0}, DATA)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(ModelError, match="expected 'squares' or 'robust'"):
-        estimate(Decay, {"k": 1.0}, DATA, loss="huber")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ModelError, match="input concentration of experiment_1 is not known"):
         estimate(Enzyme, {"top": 200.0}, Experiment({"rate": [1.0, 2.0]}))

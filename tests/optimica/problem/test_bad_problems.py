@@ -99,7 +99,7 @@ def test_a_member_that_cannot_be(members: dict[str, Any], words: str):
         ({"final_time": math.nan}, "guess final_time: found nan, expected a finite number"),
         ({"final_time": "long"}, "guess final_time: found 'long', expected a number"),
         ({"final_time": -3.0}, "expected the first to be the smaller"),
-        (3.0, "guess=3.0: expected {name:"),
+        (3.0, "found guess=3.0, expected {name:"),
     ],
 )
 def test_a_guess_that_cannot_be(guess, words):

@@ -162,7 +162,7 @@ def test_what_was_not_measured_is_refused(planned):
     q, r = plan.q[plan.measured], plan.r[plan.measured]
     with pytest.raises(ModelError, match="found x, y, z as the plan expects them"):
         measured_plan(planned, Measurements(q, r))
-    with pytest.raises(ModelError, match="they are in mm, expected m"):
+    with pytest.raises(ModelError, match="q in mm"):
         measured_plan(planned, Measurements(1e3 * q, r))
     with pytest.raises(ModelError, match="found 2 actuators, expected 3"):
         measured_plan(planned, Measurements(q[:, :2], r))

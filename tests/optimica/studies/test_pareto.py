@@ -134,9 +134,7 @@ def test_a_weight_without_solution_does_not_lose_the_others():
     assert "weight = 40: Reachable" in found.report()
     first = pareto(Reachable, "weight", [40.0, 1.0], along=["final_time"], elements=5, max_iterations=200)
     assert first["weight"].tolist() == [1.0]
-    with pytest.raises(
-        SolveError, match=r"no value of weight was solved; the first said: Reachable"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"no value of weight was solved; the first said:") as caught:
         pareto(Reachable, "weight", [40.0, 50.0], elements=5, max_iterations=200)
     assert caught.value.optimum is not None
 

@@ -38,10 +38,7 @@ def plot_tool_force(runs: Mapping[str, Result], file: str | os.PathLike[str] | N
 
 
 def plot_oscillation(
-    runs: Mapping[str, Result],
-    *,
-    begin: float = 8.0,
-    file: str | os.PathLike[str] | None = None,
+    runs: Mapping[str, Result], *, begin: float = 8.0, file: str | os.PathLike[str] | None = None
 ) -> "Figure":
     """Figure 8.5: what sounds on a stiff plate, the force over 0.4 s from `begin`, s, and the spectra of all that follows.
 

@@ -28,7 +28,7 @@ from gantrytau_optimica.calibration.design.identifiability import (
     finite_poses,
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
-from gantrytau_optimica.calibration.fitting.pose_residuals import named_slopes
+from gantrytau_optimica.calibration.fitting.pose_residuals import named_jacobian
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.links.arm_factors import NOISE, checked_poses, scales
 from gantrytau_optimica.calibration.links.arm_poses import pose_rows, tool_gain
@@ -84,7 +84,7 @@ def select_poses(
         blocks, weights = ([], []) if method == "random" else _blocks(arms, poses)
     else:
         poses, rows = finite_poses(measurements)
-        J = named_slopes(robot, parameters, joints, poses)
+        J = named_jacobian(robot, parameters, joints, poses)
         there = np.isfinite(J).all(axis=(1, 2))
         rows, (blocks, weights) = rows[there], _held([J[there]], [J[there, :3]])
     whole("select_poses", "n", n, most=len(rows))

@@ -26,7 +26,7 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
 )
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
-from gantrytau_optimica.calibration.links.arm_kinematics import ArmKinematics
+from gantrytau_optimica.calibration.links.arm_poses import ArmKinematics
 from gantrytau_optimica.calibration.links.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries

@@ -66,7 +66,7 @@ def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
     for fit in fits:
         here = fit.group.over(data.q, data.r, data.R)
         every = replace(here, free=np.ones_like(here.free))
-        numbers = np.stack([every.slopes(fit.x, k) for k in range(len(here.chains))], axis=1)
+        numbers = np.stack([every.link_jacobian(fit.x, k) for k in range(len(here.chains))], axis=1)
         if fit.minimum.rank < here.free.sum():  # what data do not hold explains nothing
             held = np.zeros((fit.minimum.rank, len(fit.x)))
             held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]

@@ -178,7 +178,7 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
             else held[:0]
         )
         for k, link in enumerate(here.chains):
-            J = here.slopes(fit.x, k)
+            J = here.link_jacobian(fit.x, k)
             J = J if sure is None else J * sure
             own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
             h = own.sum(axis=1)

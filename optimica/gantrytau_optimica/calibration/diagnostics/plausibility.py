@@ -159,7 +159,7 @@ def compare(links: Sequence[ModelLink], q: np.ndarray, r: np.ndarray, R: np.ndar
         x = linear_start(chain)
         off = _left(chain, x)
         if off > ROUGH:  # noise of millimetres in all of the equations bends what is linear in them
-            closed = least_squares(chain.error, chain.slopes, x).x
+            closed = least_squares(chain.error, chain.jacobian, x).x
             x = closed if _left(chain, closed) < off else x
         left.append(_left(chain, x))
         # a joint on the plate moves the guideway that is found, in the axes of the measurements

@@ -168,8 +168,8 @@ def _slips(systems: Sequence[LinkSystem], U: list[np.ndarray], column: int, inne
     first = _step(systems, U)
     once = _Cause("slip", U, _from(first, count), column, trials=inner)
     yield once
-    beside = [one.with_columns(X) for one, X in zip(systems, once.columns, strict=True) if X.any()]
-    second = _step(beside, [each for each in U if each.any()])
+    moved = [k for k, each in enumerate(U) if each.any()]
+    second = _step([systems[k].with_columns(once.columns[k]) for k in moved], [U[k] for k in moved])
     if abs(second - first) >= ENDS:
         between = np.abs(_from(first, count) - _from(second, count))
         yield _Cause("slip", U, between, column, trials=inner**2)

@@ -60,7 +60,7 @@ def _shared_squares(fit: Fit, along: list[np.ndarray], shared: np.ndarray, seen:
     """What errors that poses share leave of the squares of distances of each link, once numbers followed them, (links,)."""
     unit = [np.linalg.norm(u, axis=1) * f for u, f in zip(along, seen.T, strict=True)]
     X = np.stack([np.einsum("ni,nik->nk", u, shared) / s[:, None] for u, s in zip(along, unit, strict=True)])
-    J = np.stack([fit.group.slopes(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
+    J = np.stack([fit.group.link_jacobian(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
     Q = np.linalg.qr(J.reshape(-1, J.shape[2]) * fit.group.scale[fit.group.free])[0]
     flat = X.reshape(-1, X.shape[2])
     return np.sum((flat - Q @ (Q.T @ flat)).reshape(X.shape) ** 2, axis=(1, 2))
@@ -123,7 +123,7 @@ def joint_covariance(
     together = np.zeros((starts[-1], 0 if shared is None else shared.shape[2]))
     for (f, k), by_pose in zip(parts, moved, strict=True):
         fit, part = fits[f], slice(starts[f], starts[f + 1])
-        J = fit.group.slopes(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
+        J = fit.group.link_jacobian(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
         middle[part] += np.einsum("np,na->pna", J, by_pose)
         if shared is not None:
             u = fit.group.chains[k].by_pose(fit.group.numbers(k, fit.x))[0]
@@ -161,7 +161,7 @@ def _moved(
 
 
 def _of_prior(fit: Fit) -> np.ndarray:
-    """What the rows of the prior, the last of the slopes, add to J'e, in columns."""
+    """What the rows of the prior, the last of the Jacobian, add to J'e, in columns."""
     count = len(fit.group.prior)
     rows = fit.minimum.jacobian[len(fit.minimum.jacobian) - count :] / fit.minimum.scale
     return rows.T * fit.minimum.noise(fit.count)

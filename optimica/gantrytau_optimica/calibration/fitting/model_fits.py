@@ -97,16 +97,13 @@ def _placed(link: ModelLink, rail: np.ndarray, truncated: float) -> Fit:
     truncated: as of the straight guideway.
     """
     few = thinned(len(link.chain.q))
-    trials = on_rail(_with_poses(link, few), rail)
+    assert isinstance(link.chain, Chain)  # models with measured guideways have no turntables
+    trials = on_rail(replace(link, chain=link.chain.at(few)), rail)
     fits = [fit_group(grouped([trial])[0], smallest=truncated) for trial in trials]
     best = int(np.argmin([f.minimum.cost if np.isfinite(f.minimum.cost) else np.inf for f in fits]))
     if len(few) == len(link.chain.q):
         return fits[best]
     return fit_group(grouped([on_rail(link, rail)[best]])[0].started(fits[best].x))
-
-
-def _with_poses(link: ModelLink, rows: np.ndarray) -> ModelLink:
-    return replace(link, chain=link.chain.at(rows))
 
 
 def _without_plate(cart: int, links: Sequence[ModelLink]) -> ModelLink:

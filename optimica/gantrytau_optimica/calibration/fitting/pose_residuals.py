@@ -77,11 +77,11 @@ class PoseResiduals(Record):
             return e
         return np.hstack([e, self.lever * rotation_vector(R @ self.data.R @ np.swapaxes(turned, 1, 2))])
 
-    def slopes(self, x: Array) -> Array:
+    def jacobian(self, x: Array) -> Array:
         """Their derivatives by x, (N, 3 or 6, n)."""
         R, _, p = self.frame(x)
         units = np.repeat([1.0, self.lever], 3)[: 6 if self.tool.turning else 3]
-        found = -self.tool.slopes(self.data.q, p) * units[:, None]
+        found = -self.tool.jacobian(self.data.q, p) * units[:, None]
         if self.turn is None:
             return found
         count, rows = found.shape[:2]
@@ -107,7 +107,7 @@ class PoseResiduals(Record):
 
     def weighted_jacobian(self, x: Array) -> Array:
         """Derivatives of all weighted residuals, (m, n)."""
-        return (self.slopes(x) * self.weights[:, None, None]).reshape(-1, len(x))
+        return (self.jacobian(x) * self.weights[:, None, None]).reshape(-1, len(x))
 
     def robust(self, x: Array) -> tuple[Array, float, float]:
         """What a fit that strays do not lead would leave, (N, 3 or 6) by its weights, and deviations of places and turns."""
@@ -135,12 +135,14 @@ def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseR
     )
 
 
-def named_slopes(robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any) -> Array:
+def named_jacobian(
+    robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any
+) -> Array:
     """Slopes of poses (q, r, R) by named parameters and a frame, (N, 3 or 6, n), each number by what moves a metre."""
     q, r, R = poses
     tool = tool_function(robot, parameters, joints, R is not None)
     residuals, x = started(tool, Measurements(q, r, R), True)
-    return residuals.slopes(x) * residuals.scale
+    return residuals.jacobian(x) * residuals.scale
 
 
 def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResiduals, Minimum, float]:

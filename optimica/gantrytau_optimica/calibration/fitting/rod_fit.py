@@ -140,7 +140,7 @@ def _without_strays(group: Group, x: np.ndarray, weights: np.ndarray | None, noi
     sure = np.ones(len(group.chains[0].q)) if weights is None else weights
     rows = np.flatnonzero(sure > 0)[few]
     left = (group.errors(x)[rows] * sure[rows, None]).T.ravel()
-    J = np.concatenate([group.slopes(x, k)[rows] * sure[rows, None] for k in range(len(group.chains))])
+    J = np.concatenate([group.link_jacobian(x, k)[rows] * sure[rows, None] for k in range(len(group.chains))])
     rank = int(np.linalg.matrix_rank(J))
     if len(left) < 4 * rank:  # few errors do not show which of them are strays
         return noise

@@ -42,10 +42,10 @@ class Group(Record):
         """Closure errors of all poses, (N, links), in m2, or in m where there are turntables."""
         return np.column_stack([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
 
-    def slopes(self, x: np.ndarray, k: int) -> np.ndarray:
+    def link_jacobian(self, x: np.ndarray, k: int) -> np.ndarray:
         """Derivatives of the errors of chain k by the free numbers, (N, free)."""
         whole = np.zeros((len(self.chains[k].q), len(x)))
-        whole[:, self.places[k]] = self.chains[k].slopes(x[self.places[k]])
+        whole[:, self.places[k]] = self.chains[k].jacobian(x[self.places[k]])
         return whole[:, self.free]
 
     @property
@@ -66,7 +66,7 @@ class Group(Record):
         """Derivatives of the residuals by all parameters, (m, n)."""
         blocks = []
         for chain, places in zip(self.chains, self.places, strict=True):
-            small = chain.slopes(x[places])
+            small = chain.jacobian(x[places])
             blocks.append(np.zeros((len(small), len(x))))
             blocks[-1][:, places] = small
         return np.vstack(blocks)

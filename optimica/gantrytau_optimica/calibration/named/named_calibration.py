@@ -101,7 +101,7 @@ class NamedCalibration(Reported, FittedNumbers):
     @cached_property
     def _covariance(self) -> Array:
         residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
-        J = np.swapaxes(residuals.slopes(x) * residuals.weights[:, None, None] ** 2, 1, 2)
+        J = np.swapaxes(residuals.jacobian(x) * residuals.weights[:, None, None] ** 2, 1, 2)
         R = residuals.frame(x)[0]
         roots = np.broadcast_to(np.eye(3), (len(J), 3, 3)) if data.spreads is None else R @ data.spreads
         worse = np.sqrt(np.sum(roots**2, axis=(1, 2)) / 3)[:, None, None]
@@ -145,7 +145,7 @@ class NamedCalibration(Reported, FittedNumbers):
     @cached_property
     def expected(self) -> Array:
         """The error of the tool to be expected at the fitted poses, by how sure parameters are, (N,) in m."""
-        J = self.residuals.slopes(self.minimum.x)[:, :3]
+        J = self.residuals.jacobian(self.minimum.x)[:, :3]
         return np.sqrt(np.einsum("nij,jk,nik->n", J, self._covariance, J))
 
     def link_errors(self) -> list[tuple[str, Array, Array]]:
@@ -158,7 +158,7 @@ class NamedCalibration(Reported, FittedNumbers):
     def residual_series(self) -> list[ResidualSeries]:
         residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
         weights = residuals.weights[:, None]
-        left, J = residuals.poses(x) * weights, residuals.slopes(x) * weights[..., None]
+        left, J = residuals.poses(x) * weights, residuals.jacobian(x) * weights[..., None]
         noise: list[Any] = [None] * 3
         if data.spreads is not None and data.deviation is not None:
             R = residuals.frame(x)[0]

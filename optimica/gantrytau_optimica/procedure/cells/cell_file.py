@@ -15,7 +15,7 @@ from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.cameras import single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import Device, LaserTracker, TMac
-from gantrytau_optimica.procedure.documents.rapid import check_program
+from gantrytau_optimica.procedure.documents.rapid import RapidOptions
 
 POINT = Value("m", ((3,),))
 ROTATION = Value("1", ((3, 3),))
@@ -222,7 +222,7 @@ def _bodies(place: str, entries: Any, kinds: Mapping[str, Any]) -> list[Any]:
 def _program(place: str, table: Any) -> dict[str, Any]:
     """Options of the robot program, all of which RAPID takes."""
     values = read_table(place, table, PROGRAM)
-    told(place.removesuffix(": program"), lambda: check_program(**values))
+    told(place.removesuffix(": program"), lambda: RapidOptions(**values))
     return values
 
 

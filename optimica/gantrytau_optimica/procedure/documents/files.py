@@ -13,7 +13,7 @@ from gantrytau import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.documents.figures import draw_plan
 from gantrytau_optimica.procedure.documents.plan_page import html_page
-from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.documents.rapid import RapidOptions, rapid_program
 from gantrytau_optimica.procedure.monte_carlo import Trials
 from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import CRITERION, PoseChoice
@@ -27,17 +27,17 @@ TEMPLATE = "measurements-template.csv"
 PLACES = ("r", "R", "q")  # of the workspace, which JSON leaves out
 
 
-def write_plan(plan: PosePlan, folder: Path, program: dict[str, Any]) -> Path:
+def write_plan(plan: PosePlan, folder: Path, program: RapidOptions) -> Path:
     """See `CalibrationPlan.write`."""
-    text = rapid_program(plan, **program)  # before anything is written
+    text = rapid_program(plan, program)  # before anything is written
     check_folder("write", folder)
     folder.mkdir(exist_ok=True)
     picture = None
     if plan.cell is not None:
         picture = folder / "workspace.png"
         draw_plan(plan, picture)
-    name = f"{program.get('name', 'Calibration')}.mod"
-    page = html_page(plan, picture, name, folder=folder, trigger=program.get("trigger", OPERATOR))
+    name = f"{program.name}.mod"
+    page = html_page(plan, picture, name, folder=folder, trigger=program.trigger)
     _write(folder / "poses.csv", lambda path: _write_poses(plan, path))
     _write(folder / TEMPLATE, lambda path: _write_template(plan, path))
     _write(folder / name, lambda path: path.write_text(text, encoding="ascii"))

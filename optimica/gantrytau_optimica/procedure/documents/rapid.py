@@ -9,6 +9,7 @@ characters at most, names 32.
 import re
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from gantrytau import ModelError
 from gantrytau.border.checks import check_words, number
 from gantrytau.border.refusal import Given
+from gantrytau.describing.record import Record
 from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
@@ -32,25 +34,40 @@ RESERVED = {
 }  # fmt: skip
 
 
-def rapid_program(
-    plan: PosePlan,
-    name: str = "Calibration",
-    *,
-    speed: float = 0.1,
-    settle: float = 1.0,
-    measure: float = 2.0,
-    carts: Literal["robax", "extax"] = "robax",
-    trigger: str = OPERATOR,
-    tool: str = "tool0",
-) -> str:
-    """See `CalibrationPlan.program`."""
-    check_program(
-        name=name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
-    )
+@dataclass(frozen=True)
+class RapidOptions(Record):
+    """Options of a robot program, as `CalibrationPlan.program` explains them; ModelError for what RAPID does not take."""
+
+    name: str = "Calibration"
+    speed: float = 0.1
+    settle: float = 1.0
+    measure: float = 2.0
+    carts: Literal["robax", "extax"] = "robax"
+    trigger: str = OPERATOR
+    tool: str = "tool0"
+
+    def __post_init__(self):
+        check_words(RapidOptions, vars(self), "program")
+        number("program", "speed", self.speed, least=1e-3)
+        number("program", "settle", self.settle, least=0.0)
+        number("program", "measure", self.measure, least=0.0)
+        for what in ("name", "tool", *(() if self.trigger in (OPERATOR, WORDS) else ("trigger",))):
+            word = getattr(self, what)
+            if not NAME.fullmatch(word) or word.lower() in RESERVED:
+                raise ModelError(
+                    "expected a name of RAPID: a letter, then letters, digits and _, 32 characters at most, no reserved "
+                    "word",
+                    place="program",
+                    found=Given(what, word),
+                )
+
+
+def rapid_program(plan: PosePlan, options: RapidOptions) -> str:
+    """The text of a RAPID module that drives through the poses of a plan."""
+    name, carts, trigger = options.name, options.carts, options.trigger
     lines = [f"MODULE {name}", *_comments(plan, carts, trigger)]
-    lines += [
-        f"  CONST speeddata speedCalibration:=[{_number(speed * 1e3, 3)},20,{_number(speed * 1e3, 3)},20];"
-    ]
+    speed = _number(options.speed * 1e3, 3)
+    lines += [f"  CONST speeddata speedCalibration:=[{speed},20,{speed},20];"]
     lines += ["  VAR num keyCalibration;"] if trigger == OPERATOR else []
     labels = [_label(plan, k) for k in range(len(plan.q))]
     for label in dict.fromkeys(labels):
@@ -58,37 +75,12 @@ def rapid_program(
     lines += ["", f"  PROC {_procedure(name)}()"]
     count, done = int(plan.measured.sum()), 0
     for label, measured in zip(labels, plan.measured, strict=True):
-        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {tool};")
+        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {options.tool};")
         if measured:
             done += 1
-            lines += _trigger(trigger, f"{label}, {done} of {count}", settle, measure)
+            lines += _trigger(trigger, f"{label}, {done} of {count}", options.settle, options.measure)
     lines += ["  ENDPROC", "ENDMODULE", ""]
     return "\n".join(lines)
-
-
-def check_program(
-    *,
-    name: str = "Calibration",
-    speed: float = 0.1,
-    settle: float = 1.0,
-    measure: float = 2.0,
-    carts: Literal["robax", "extax"] = "robax",
-    trigger: str = OPERATOR,
-    tool: str = "tool0",
-) -> None:
-    """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
-    check_words(check_program, locals(), "program")
-    number("program", "speed", speed, least=1e-3)
-    number("program", "settle", settle, least=0.0)
-    number("program", "measure", measure, least=0.0)
-    names = {"name": name, "tool": tool} | ({} if trigger in (OPERATOR, WORDS) else {"trigger": trigger})
-    for what, word in names.items():
-        if not NAME.fullmatch(word) or word.lower() in RESERVED:
-            raise ModelError(
-                "expected a name of RAPID: a letter, then letters, digits and _, 32 characters at most, no reserved word",
-                place="program",
-                found=Given(what, word),
-            )
 
 
 def _procedure(name: str) -> str:

@@ -209,13 +209,7 @@ def test_poses_out_of_reach_are_told(truth, poses):
 
 
 def test_what_cannot_be_an_arm_is_refused():
-    with pytest.raises(
-        ModelError, match=r"orientation: found 'euler', expected one of 'local', 'unit', 'free'"
-    ):
-        read_arms(F1GantryTau(prototypes.F1), "euler")  # type: ignore
-    with pytest.raises(
-        ModelError, match=r"found FourBar that does not say what its rods are, expected a robot such as"
-    ):
+    with pytest.raises(ModelError, match="FourBar that does not say what its rods are"):
         read_arms(FourBar())
     stretched = F1GantryTau(prototypes.F1, turntables=[dict(orientation=[1.0, 0.1, 0.0, 0.0]), {}, {}])
     with pytest.raises(
@@ -226,33 +220,23 @@ def test_what_cannot_be_an_arm_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("argument", "value", "names"),
+    ("change", "argument", "names"),
     [
-        ("prior", {"arms[0].lenght": 1e-3}, "did you mean 'arms[0].links[0].length"),
-        ("prior", {"arms[0].offset": 0.0}, "arms[0].offset"),
-        ("prior", [1.0], "a dict"),
+        (dict(prior={"arms[2].lenght": 1e-3}), "prior", "did you mean 'arms[2]."),
+        (dict(prior={"arms[2].offset": 0.0}), "prior", "arms[2].offset"),
+        (dict(prior=[1.0]), "prior", "a dict"),
+        (dict(q=np.zeros((185, 4))), "q", "185 x 4"),
+        (dict(r=np.zeros((4, 3))), "r", "4 x 3"),
+        (dict(r=np.full((185, 3), np.nan)), "r", "finite"),
+        (dict(R=None), "R", "the plate turns"),
     ],
+    ids=["name", "deviation", "mapping", "joints", "rows", "finite", "orientations"],
 )
-def test_wrong_priors_are_refused(argument, value, names, truth, data):
+def test_what_does_not_fit_an_arm_is_refused(change, argument, names, truth, data):
     with pytest.raises(ModelError) as refusal:
-        fit_arm(truth[0], *data, **{argument: value})
+        fit_arm(truth[2], **{**data._asdict(), **change})
     assert refusal.value.argument == argument
     assert names in str(refusal.value)
-
-
-def test_arrays_that_do_not_fit_are_told(truth, data):
-    with pytest.raises(
-        ModelError, match=r"arms\[2\]: found q, r, R of the shapes .*, expected \(N, 6\), \(N, 3\)"
-    ):
-        fit_arm(truth[2], data.q[:, :5], data.r, data.R)
-    with pytest.raises(ModelError, match=r"arms\[0\]: found no orientations R, expected \(N, 3, 3\)"):
-        fit_arm(truth[0], data.q, data.r, None)
-    r = data.r.copy()
-    r[[4, 7]] = np.nan
-    with pytest.raises(ModelError, match=r"numbers that are not finite in rows 4, 7; leave those poses out"):
-        fit_arm(truth[0], data.q, r, data.R)
-    with pytest.raises(ModelError, match="'x' is not identified"):
-        solve([fitted(truth[0], data)], {"x": 1.0})
 
 
 class Guideway(Model):

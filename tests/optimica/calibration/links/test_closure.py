@@ -1,4 +1,4 @@
-"""Closure equations: their slopes, and a few rows that stand for all poses."""
+"""Closure equations: their Jacobians, and a few rows that stand for all poses."""
 
 import numpy as np
 import pytest
@@ -25,13 +25,13 @@ KINDS = ["line", "line plate", "points", "points plate"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_slopes_are_the_derivatives(kind):
+def test_jacobians_are_the_derivatives(kind):
     one = chain(kind)
     p = RNG.normal(size=one.size)
     step = 1e-6
     difference = [(one.error(p + step * e) - one.error(p - step * e)) / (2 * step) for e in np.eye(one.size)]
     # central differences of a polynomial of the fourth degree: step^2 and rounding / step
-    assert one.slopes(p) == pytest.approx(np.transpose(difference), abs=1e-7)
+    assert one.jacobian(p) == pytest.approx(np.transpose(difference), abs=1e-7)
 
 
 @pytest.mark.parametrize("kind", ["line", "line plate"])
@@ -42,8 +42,8 @@ def test_few_rows_have_the_squares_of_all_poses(kind, weighted):
     few = condense(one, weights)
     p = RNG.normal(size=one.size)
     w = 1.0 if weights is None else weights
-    e, J = w * one.error(p), one.slopes(p) * (1.0 if weights is None else weights[:, None])
-    f, K = few.error(p), few.slopes(p)
+    e, J = w * one.error(p), one.jacobian(p) * (1.0 if weights is None else weights[:, None])
+    f, K = few.error(p), few.jacobian(p)
     assert len(f) <= 31
     assert f @ f == pytest.approx(e @ e, rel=1e-12)
     assert K.T @ K == pytest.approx(J.T @ J, rel=1e-10, abs=1e-8 * np.abs(J.T @ J).max())
