@@ -136,8 +136,8 @@ def test_files_of_parameters_and_studies_bring_their_units(answer, fails, shaft,
     final = run_of(answer, shaft, "--set", str(values))["final"]
     assert (final["J"], final["r[1]"]) == (2.0, 0.002)
     values.write_text('J = "20000"\n')
-    assert "J: found '20000' in quotes and without a unit" in " ".join(
-        fails(2, "simulate", shaft, "--stop", "1", "--set", str(values)).split()
+    assert "found '20000' in quotes and without a unit" in " ".join(
+        fails(1, "simulate", shaft, "--stop", "1", "--set", str(values)).split()
     )
     study = tmp_path / "study.toml"
     study.write_text(

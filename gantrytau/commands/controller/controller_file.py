@@ -85,7 +85,8 @@ def read_controller(file: Path, clock: str | None = None) -> Controller:
         if "kinematics" in table:
             keywords["kinematics"] = named(table["kinematics"], file.parent, LIBRARY)
         clients = [_client(file, name) for name in table.get("clients", [])]
-        clients += [_place(name, own) for name, own in table.get("places", {}).items()]
+        places = _tables("places", table.get("places", {}))
+        clients += [_place(name, own) for name, own in places.items()]
         parts = (_part(file, table["plant"]), _part(file, table["law"]))
         controller = Controller(*parts, clients=clients, **keywords)
         for k, event in enumerate(table.get("event", [])):
@@ -115,11 +116,15 @@ def _client(file: Path, text: str) -> Any:
         ) from error
 
 
+def _tables(place: str, table: Any) -> dict[str, Any]:
+    """A table of tables with any names."""
+    return read_table(place, table, dict.fromkeys(table, Value("table")))
+
+
 def _place(name: str, sends: Any) -> RemoteClient:
     """A place for a client over the network, and what it sends."""
-    tables = read_table(f"places.{name}", sends, dict.fromkeys(sends, Value("table"))) if sends else {}
     channels = []
-    for channel, own in tables.items():
+    for channel, own in _tables(f"places.{name}", sends).items():
         keys = read_table(f"places.{name}.{channel}", own, CHANNEL)
         channels.append(Channel(channel, keys.pop("unit", "1"), **keys))
     return RemoteClient(name, Declaration(channels))

@@ -15,7 +15,7 @@ def test_the_example_is_printed(run, fails):
     six = run("calibrate", "--example", "--robot", "SixLinkGantryTau(L1)").stdout
     assert 'model = "SixLinkGantryTau(L1)"' in six
     assert six.startswith("# Limits, device and home below fit SixLinkGantryTau(D1): make them")
-    assert "f2" in fails(MISUSE, "calibrate", "--example", "f2")
+    assert "there is no such example" in fails(MISUSE, "calibrate", "--example", "f2")
     assert "for a cell to begin with give --example six" in fails(MISUSE, "calibrate", "six")
 
 
@@ -25,9 +25,9 @@ def test_the_example_is_printed(run, fails):
         (dict(tape='tap = "5 mm"'), "robot.tap: there is no such key; did you mean 'tape'?"),
         (dict(low="low = [2.0, 2.3, -1.6]"), "limits.obstacles[0]: Box: found low"),
         (dict(kind='kind = "bax"'), "limits.obstacles[0].kind: found \"bax\"; did you mean 'box'?"),
-        (dict(facing="facing = [0, 0, 0]"), "device: LaserTracker: found facing"),
+        (dict(facing="facing = [0, 0, 0]"), "device: found facing="),
         (dict(model='model = "GantryTau(X1)"'), "robot.model: --prototype X1: there is no prototype 'X1'"),
-        (dict(name='name = "1Cal"'), "program.name: found '1Cal', expected a name of RAPID"),
+        (dict(name='name = "1Cal"'), "program: found name='1Cal', expected a name of RAPID"),
     ],
 )
 def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
@@ -42,7 +42,7 @@ def test_cells_that_cannot_be_read(fails, tmp_path, lines, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("[goal]", "[goals]", "[goals]: there is no such table; did you mean 'goal'?"),
+        ("[goal]", "[goals]", "goals: there is no such key; did you mean 'goal'?"),
         ("[device]", "[[device]]", "device: found"),
         ('# "arms[0].length" = 2.061', '"arms[0].lenght" = 2.0', "values: arms[0].lenght: "),
         ('# "arms[0].length" = 2.061', "arms.length = 2.0", "write the name in quotes"),
@@ -58,9 +58,7 @@ def test_tables_that_cannot_be_read(fails, tmp_path, old, new, words):
 def test_a_table_that_is_missing(fails, tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text('[robot]\nmodel = "GantryTau(L1)"\ntape = 0.005\n')
-    assert "found no table [goal], expected one; `gantrytau calibrate --example`" in fails(
-        MISUSE, "calibrate", file
-    )
+    assert "goal: found nothing, expected a table" in fails(MISUSE, "calibrate", file)
     assert "there is no such file" in fails(MISUSE, "calibrate", tmp_path / "nowhere.toml")
 
 

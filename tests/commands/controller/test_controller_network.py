@@ -88,7 +88,7 @@ def test_what_is_wrong_is_told_in_options(cell):
     for arguments, words in (
         (
             ["stream", cell / "u.csv", "--port", 9, "--at-end", "dance"],
-            "--at-end dance: expected hold or stop",
+            "'dance' is not one of 'hold', 'stop'",
         ),
         (["stream", cell / "missing.csv", "--port", 9], "found no file to read"),
         (["stream", cell / "none.csv", "--port", 9], "furlong"),
@@ -152,9 +152,9 @@ def test_without_waiting_it_runs_at_once(cell):
 @pytest.mark.parametrize(
     ("places", "words"),
     [
-        ("[places]\nstream = 3\n", "places.stream: found 3, expected what it sends"),
+        ("[places]\nstream = 3\n", "places.stream: found 3, expected a table"),
         ("[places.stream]\ndelta = 1.0\n", "places.stream.delta: found 1.0, expected a table"),
-        ("[places.stream]\ndelta = { unut = 'm' }\n", "there is no key 'unut'"),
+        ("[places.stream]\ndelta = { unut = 'm' }\n", "places.stream.delta.unut: there is no such key"),
         ("[places.stream]\ndelta = { unit = 'mm' }\n", "'mm' is not a coherent SI unit"),
     ],
 )
