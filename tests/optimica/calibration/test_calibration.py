@@ -218,7 +218,7 @@ def test_residual_tests_see_a_bent_guideway(poses, tmp_path):
     ("arguments", "words"),
     [
         (dict(model=3), "all six links"),
-        (dict(model=2), "measured points of all 3 guideways"),
+        (dict(model=2), "rails"),
         (dict(constraints={"arms[0].length": 2.0}), "constraints="),
         (dict(holdout="third"), "holdout='third'"),
         (dict(holdout=[1000]), "rows from 0 to 778"),
