@@ -16,10 +16,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from gantrytau.answers.linear_systems.linear_system import LinearSystem
-
 MOST = 16  # pairs of inputs and outputs that one figure still shows
 POINTS = 2000
+
+
+class Drawn(Protocol):
+    """What is drawn of a linear system."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    period: float | None
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def poles(self) -> np.ndarray: ...
+    @property
+    def zeros(self) -> np.ndarray: ...
+    def unit(self, name: str) -> str: ...
+    def response(self, frequencies: Any) -> np.ndarray: ...
 
 
 class Spectrum(Protocol):
@@ -31,7 +46,7 @@ class Spectrum(Protocol):
     def response(self) -> np.ndarray: ...
 
 
-def frequencies_to_draw(system: "LinearSystem") -> np.ndarray:
+def frequencies_to_draw(system: Drawn) -> np.ndarray:
     """Frequencies in Hz, (N,), from a tenth of the slowest pole or zero to ten times the fastest, dense at resonances."""
     corners = np.concatenate([in_s(system.poles, system.period), in_s(system.zeros, system.period)])
     corners = corners[np.isfinite(corners)]
@@ -61,7 +76,7 @@ class Curves:
 
 
 def beside_each_other(
-    system: "LinearSystem", verb: str, beside: Mapping[str, Any] | None, spectra: bool = False
+    system: Drawn, verb: str, beside: Mapping[str, Any] | None, spectra: bool = False
 ) -> dict[str, Any]:
     """A system under its title, and others by their names; ModelError for what is none, or of another shape."""
     found: dict[str, Any] = {system.title: system}
@@ -109,9 +124,7 @@ def curves_of(systems: Mapping[str, Any], frequencies: Any) -> list["Curves"]:
     return found
 
 
-def draw_bode(
-    system: "LinearSystem", curves: Sequence[Curves], file: str | os.PathLike[str] | None
-) -> "Figure":
+def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None) -> "Figure":
     """Gain in the units of the quantities and phase in degrees over frequency in Hz, a column for each input."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
@@ -169,7 +182,7 @@ def _draw_curve(gain: "Axes", phase: "Axes", curve: Curves, values: np.ndarray) 
     phase.semilogx(curve.hertz, angles, linestyle=line, marker=marker, markersize=3)
 
 
-def draw_poles(systems: Mapping[str, "LinearSystem"], file: str | os.PathLike[str] | None) -> "Figure":
+def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None) -> "Figure":
     """Poles as crosses, zeros as circles; the edge of stability is the imaginary axis or the unit circle.
 
     Of several systems in the plane of z where they share a period, else in that of s, where those of z have no zeros:
