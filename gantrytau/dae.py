@@ -84,7 +84,7 @@ class Dae(Translated):
         """The same for many points at once: arrays (N, k) of what is given to arrays (N, m) of what is found, a row a point.
 
         It gives the answers of `function` point by point, which are exact on the branch of the start or NaN, ten to a
-        hundred times sooner; `.slopes` are its derivatives. Raises what `function` raises.
+        hundred times sooner; `.jacobian` are its derivatives. Raises what `function` raises.
         """
         return ArrayFunction(self, names(given), names(find))
 

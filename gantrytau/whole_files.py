@@ -14,7 +14,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A name beside `path` to write to; it takes the place of `path` at the end, or vanishes on an error; Ctrl-C waits."""
     path = Path(path)
     if not path.parent.is_dir():
-        raise ModelError(f"{path}: the folder '{path.parent}' does not exist; create it, or name another one")
+        raise ModelError(
+            f"the folder '{path.parent}' does not exist; create it, or name another one", place=str(path)
+        )
     partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         with uninterrupted():

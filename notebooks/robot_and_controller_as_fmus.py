@@ -26,7 +26,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from gantrytau import Real, simulate
-from gantrytau_fmu import cosimulate, export_fmu, read_fmu
+from gantrytau_fmu import Master, cosimulate, export_fmu, read_fmu
 from gantrytau_models import (
     CircularReference,
     ControlledRobot,
@@ -181,7 +181,7 @@ print(f"{'step':>8}{'controller first':>22}{'both at once':>18}")
 apart = {}
 for step in (0.004, 0.002, 0.001):
     for order in ("gauss-seidel", "jacobi"):
-        run = cosimulate(files, WIRES, stop=2.0, step=step, order=order)
+        run = cosimulate(files, WIRES, stop=2.0, step=step, master=Master(order=order))
         there = whole["r"][:: round(step / 0.001)]
         apart[step, order] = np.linalg.norm(run["robot.tool.r"] - there, axis=1).max()
     gauss_seidel, jacobi = apart[step, "gauss-seidel"], apart[step, "jacobi"]

@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 from gantrytau import GantryTauError, Result, study, view
 from gantrytau.commands.arguments.saved_results import read_result
 from gantrytau.viewing import MeshFile
-from gantrytau_fmu import export_fmu
+from gantrytau_fmu import Build, export_fmu
 from gantrytau_models import Pendulum
 from gantrytau_optimica.vision.opencv import opencv
 
@@ -187,7 +187,7 @@ WITHOUT = [  # module that is missing, the extra that has it, and a call that ne
     ("dask", *CLUSTER),
     ("distributed", *CLUSTER),
     ("cv2", "vision", opencv),
-    ("ziglang", "cross", lambda: export_fmu(Pendulum(), "a.fmu", platforms=("aarch64-linux",))),
+    ("ziglang", "cross", lambda: export_fmu(Pendulum(), "a.fmu", build=Build(platforms=("aarch64-linux",)))),
 ]
 
 

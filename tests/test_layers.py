@@ -43,7 +43,6 @@ READMES = {  # the page with the map of a folder
 }
 FILES_IN_A_FOLDER, FILES_IN_THE_ROOT, LINES, LINES_OF_A_FUNCTION, ARGUMENTS = 14, 8, 400, 60, 8
 SHARED_CLASSES = {  # each is the word of its field, and public
-    "Experiment",  # of an FMU, and of an estimation
     "Camera",  # a device that stands somewhere, and one of which only images are known
     "Pattern",  # of a sparse matrix, and that which cameras look for
 }
@@ -64,16 +63,6 @@ EXCEPTIONS = {  # offences that are let pass; this list only shrinks
     "gantrytau_optimica.procedure.documents.files imports csv",  # writes
     "gantrytau_optimica.studies.figures imports csv",  # writes
     "gantrytau_fmu.building.compile_libraries imports importlib.util",  # asks for a package
-    "gantrytau.commands.arguments.display_option edits a message",
-    "gantrytau.commands.arguments.values edits a message",
-    "gantrytau.commands.controller.controller_file edits a message",
-    "gantrytau.commands.estimate.estimate_file edits a message",
-    "gantrytau.commands.printing.result_output edits a message",
-    "gantrytau.language.parameter_files edits a message",
-    "gantrytau_fmu.controller.controller edits a message",
-    "gantrytau_fmu.reading.check_fmu edits a message",
-    "gantrytau_fmu.systems.run_fmu edits a message",
-    "gantrytau_fmu.systems.ssp.system_description edits a message",
 }
 
 
@@ -349,8 +338,8 @@ OFFENCES = {  # rule -> files of a house, and what is said of them
         {
             "gantrytau/figures": "class A: ...",
             "gantrytau/results/figures": "class A: ...\nclass B: ...",
-            "gantrytau/results/graph": "class Experiment: ...",
-            "gantrytau/writing/graph": "class Experiment: ...",
+            "gantrytau/results/graph": "class Camera: ...",
+            "gantrytau/writing/graph": "class Camera: ...",
             "gantrytau/mechanics/rotational": "class B: ...",
         },
         {"class A 2 times"},

@@ -6,7 +6,7 @@ Required arguments are stand-ins: words and numbers are looked at first, so that
 import importlib
 import inspect
 from dataclasses import is_dataclass
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, Union, Unpack, get_args, get_origin, get_type_hints
 
 import pytest
 
@@ -29,8 +29,13 @@ NO_WORDS = ("wordless", 7, ["a"])
 
 
 def hints(function: Any) -> dict[str, Any]:
-    """The annotations of the arguments; those written as text name what is imported late."""
-    return {p.name: p.annotation for p in inspect.signature(function).parameters.values()}
+    """The annotations of the arguments, those of `**keywords: Unpack[TypedDict]` too; those written as text name what is
+    imported late.
+    """
+    found = {p.name: p.annotation for p in inspect.signature(function).parameters.values()}
+    for hint in list(found.values()):
+        found |= get_type_hints(get_args(hint)[0]) if get_origin(hint) is Unpack else {}
+    return found
 
 
 def members(hint: Any) -> tuple[Any, ...]:
@@ -46,16 +51,6 @@ def wrong_values(hint: Any) -> tuple[Any, ...]:
     if kinds and all(kind in (int, float) or get_origin(kind) is Literal for kind in kinds):
         return NO_NUMBERS
     return ()
-
-
-def stand_in(hint: Any) -> Any:
-    """What a required argument is given while another is wrong: a number or word where it is one, else any object."""
-    for kind in members(hint):
-        if kind in (int, float):
-            return kind(1)
-        if get_origin(kind) is Literal:
-            return get_args(kind)[0]
-    return object()
 
 
 def checks_itself(kind: type) -> bool:
@@ -74,11 +69,11 @@ def cases() -> list[tuple[str, str]]:
             if not callable(function) or (inspect.isclass(function) and not checks_itself(function)):
                 continue
             try:
-                signature = inspect.signature(function)
+                annotations = hints(function)
             except ValueError:
                 continue
-            for argument in signature.parameters:
-                if wrong_values(hints(function).get(argument, Any)):
+            for argument, hint in annotations.items():
+                if wrong_values(hint):
                     found.setdefault((id(function), argument), (f"{door}:{name}", argument))
     return sorted(found.values())
 
@@ -92,7 +87,7 @@ def test_a_wrong_word_or_number_is_refused_by_its_name(path, argument):
     function = getattr(importlib.import_module(door), name)
     parameters = inspect.signature(function).parameters.values()
     required = {
-        p.name: stand_in(p.annotation)
+        p.name: 1 if wrong_values(hints(function)[p.name]) == NO_NUMBERS else object()
         for p in parameters
         if p.default is p.empty and p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)
     }

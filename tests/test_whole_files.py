@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, Parameter, Result
-from gantrytau_fmu import export_fmu
+from gantrytau_fmu import Build, export_fmu
 from gantrytau_models import Pendulum
 from gantrytau_optimica import load_optimum, optimize, pareto, save_optimum
 from gantrytau_optimica.answers.archive.run_record import write_record
@@ -49,7 +49,7 @@ WRITERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "optimum": ("a.optimum", lambda path: save_optimum(solved(), path)),
     "record": ("a.json", lambda path: write_record(solved(), path)),
     "study": ("a.csv", lambda path: study().save(path)),
-    "fmu": ("a.fmu", lambda path: export_fmu(Pendulum(), path, platforms=())),
+    "fmu": ("a.fmu", lambda path: export_fmu(Pendulum(), path, build=Build(platforms=()))),
 }
 
 

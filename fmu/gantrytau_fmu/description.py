@@ -92,7 +92,7 @@ class FmuInterface(Record):
 
 
 @dataclass(frozen=True)
-class Experiment:
+class DefaultExperiment:
     """The default experiment, s; step: of Co-Simulation. None for what a file does not say."""
 
     start: float | None = 0.0
@@ -137,7 +137,7 @@ class FmuDescription(AboutFmu):
     interfaces: tuple[FmuInterface, ...]
     variables: tuple[FmuVariable, ...] = field(repr=False)
     structure: ModelStructure = field(default_factory=ModelStructure, repr=False)
-    experiment: Experiment = field(default_factory=Experiment)
+    experiment: DefaultExperiment = field(default_factory=DefaultExperiment)
     terminals: tuple[FmuTerminal, ...] = ()
     platforms: tuple[str, ...] = ()
     sources: tuple[str, ...] = ()

@@ -4,15 +4,16 @@ import hashlib
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import astuple, dataclass, fields, replace
 from datetime import UTC, datetime
 from importlib import resources
 from pathlib import Path
 from typing import Literal
 
 from gantrytau import Dae, Model, translate
-from gantrytau.border.refusal import ModelError, did_you_mean
-from gantrytau_fmu.building.archive import binary_members, check_target, write_fmu
+from gantrytau.border.checks import check_words, instance, number, one_of
+from gantrytau.border.refusal import Given, ModelError
+from gantrytau_fmu.building.archive import binary_members, check_target, write_archive
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
 from gantrytau_fmu.code.contents import Contents, contents_of
@@ -24,7 +25,7 @@ from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.model_description import COMPILED, build_description, model_description
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
-from gantrytau_fmu.description import AboutFmu, Experiment, FmuDescription, FmuInterface, Interfaces
+from gantrytau_fmu.description import AboutFmu, DefaultExperiment, FmuDescription, FmuInterface, Interfaces
 
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
@@ -37,6 +38,24 @@ HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
 LARGE = 100_000  # operations from which on the compiler is asked for less; its second level gains nothing
 
 
+@dataclass(frozen=True)
+class Build(AboutFmu):
+    """What goes into the file of an FMU beside its model.
+
+    platforms: "native", "all" or names such as "x86_64-windows" (all but "native" need the extra `cross`), () for sources
+    alone; sources: put the C sources into the file; experiment: the default experiment, else one of 1 s with the tolerance
+    of the FMU; description: else the first line of the class's docstring.
+    Raises ModelError for a platform that does not exist.
+    """
+
+    platforms: str | Sequence[str] = ("native",)
+    sources: bool = True
+    experiment: DefaultExperiment | None = None
+
+    def __post_init__(self):
+        chosen(self.platforms)
+
+
 def export_fmu(
     model: Model | Dae,
     path: str | Path,
@@ -45,85 +64,50 @@ def export_fmu(
     interfaces: Sequence[Interfaces] | Interfaces = BOTH,
     solver: Literal["dopri5", "rodas4"] = "dopri5",
     tolerance: float = 1e-6,
-    platforms: str | Sequence[str] = ("native",),
     given: Sequence[str] = (),
     find: Sequence[str] = (),
     states: Sequence[str] | None = None,
-    sources: bool = True,
-    description: str = "",
-    author: str = "",
-    copyright: str = "",
-    license: str = "",
-    version: str = "",
-    experiment: Experiment | None = None,
+    build: Build | None = None,
 ) -> Path:
     """Write a model as FMU and return its path.
 
     fmi: version of the standard; interfaces: "model-exchange", "co-simulation" or both; solver, tolerance: of
-    Co-Simulation, explicit or for stiff models; platforms: "native", "all" or names such as "x86_64-windows" (all but
-    "native" need the extra `cross`); given: known variables instead of the declared inputs, and parameters to be kept
-    that else shape the equations; derivatives of given variables that the model needs become inputs, too; find: the
+    Co-Simulation, explicit or for stiff models; given: known variables instead of the declared inputs, and parameters to
+    be kept that else shape the equations; derivatives of given variables that the model needs become inputs, too; find: the
     outputs, else those that the model declares, with all other variables as local ones, else, where none is declared,
-    all variables; states: preferred states; sources: put the C sources into the file; description: else the first line
-    of the class's docstring.
+    all variables; states: preferred states; build: platforms and what the file says of itself, by default `Build()`.
     Without a compiler a source FMU is written, with a warning. An existing file is replaced when the new one is
     complete. Raises ModelError for wrong arguments, unwritable paths and failed compilations, and what `translate`
     raises. FMI 2.0.4 and 3.0.2.
     """
+    check_words(export_fmu, {"fmi": fmi, "solver": solver})
+    number("export_fmu", "tolerance", tolerance, least=1e-12, below=1.0)
     kinds = _interfaces(interfaces)
-    _check(fmi, solver, tolerance)
-    targets = chosen(platforms)
+    about: Build = instance("export_fmu", "build", Build() if build is None else build, Build)
     check_target(path)
     dae = _translated(model, given, find, states)
     dae = with_ends_of_tables(dae)
     outputs, others = _shown(dae, find)
     graph = entered(formulas_of(dae, [*outputs, *others]))
     contents = contents_of(graph, outputs, others)
-    words = description or _first_words(model) or f"{dae.name}, a model of gantrytau"
-    about = AboutFmu(words, author, copyright, license, version)
+    about = replace(about, description=about.description or _description(model, dae))
+    about = replace(about, experiment=about.experiment or DefaultExperiment(tolerance=tolerance))
     token = _token(graph.formulas, contents, fmi, solver, tolerance)
-    fmu = _described(
-        graph.formulas, contents, about, token, kinds, experiment or Experiment(tolerance=tolerance)
-    )
+    fmu = _described(graph.formulas, contents, about, token, kinds)
     code = model_code(graph, contents, name=fmu.name, token=token, interfaces=kinds, tolerance=tolerance)
     texts = source_files(code.text, solver)
-    binaries = _compiled(texts, targets, fmu.identifier, code.operations)
+    binaries = _compiled(texts, chosen(about.platforms), fmu.identifier, code.operations)
     fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
-    if sources or not binaries:
+    if about.sources or not binaries:
         fmu = replace(fmu, sources=(f"sources/{COMPILED}",))
-    return write_fmu(path, _members(fmu, solver, texts, binaries))
+    return write_archive(path, _members(fmu, solver, texts, binaries))
 
 
 def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfaces, ...]:
     found = (interfaces,) if isinstance(interfaces, str) else tuple(interfaces)
-    for one in found:
-        if one not in BOTH:
-            raise ModelError(
-                f"export_fmu: found the interface {one!r}, expected model-exchange or co-simulation"
-                f"{did_you_mean(str(one), BOTH)}",
-                argument="interfaces",
-            )
-    if not found:
-        raise ModelError(
-            "export_fmu: found no interfaces, expected model-exchange, co-simulation or both",
-            argument="interfaces",
-        )
+    for one in found or (None,):
+        one_of("export_fmu", "interfaces", one, BOTH)
     return tuple(one for one in BOTH if one in found)
-
-
-def _check(fmi: str, solver: str, tolerance: float) -> None:
-    if fmi not in ("2.0", "3.0"):
-        raise ModelError(f"export_fmu: found fmi={fmi!r}, expected '3.0' or '2.0'", argument="fmi")
-    if solver not in SOLVERS:
-        raise ModelError(
-            f"export_fmu: found solver={solver!r}, expected 'dopri5', or 'rodas4' for stiff models",
-            argument="solver",
-        )
-    if isinstance(tolerance, bool) or not isinstance(tolerance, (int, float)) or not 1e-12 <= tolerance < 1:
-        raise ModelError(
-            f"export_fmu: found tolerance={tolerance!r}, expected a number from 1e-12 to below 1",
-            argument="tolerance",
-        )
 
 
 def _translated(
@@ -132,25 +116,28 @@ def _translated(
     if isinstance(model, Dae):
         if given or states is not None:
             raise ModelError(
-                "export_fmu: found a translated model with given= or states=, expected these where it is translated; give "
-                "the model itself, or translate(model, given=..., states=...)"
+                "found a translated model with ",
+                Given("given"),
+                " or ",
+                Given("states"),
+                ", expected these where it is translated; give the model itself, or translate(model, given=..., states=...)",
+                place="export_fmu",
             )
         return model
     return translate(model, given=given, find=find, states=states, events=True)
 
 
-def _first_words(model: Model | Dae) -> str:
-    """The first line of the class's own words."""
-    words = type(model).__dict__.get("__doc__") if isinstance(model, Model) else None
-    return (words or "").strip().partition("\n")[0].rstrip(".")
+def _description(model: Model | Dae, dae: Dae) -> str:
+    """The first line of the class's own docstring."""
+    text = type(model).__dict__.get("__doc__") if isinstance(model, Model) else None
+    return (text or "").strip().partition("\n")[0].rstrip(".") or f"{dae.name}, a model of gantrytau"
 
 
 def _shown(dae: Dae, find: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Scalar names of the outputs and of local variables."""
     if isinstance(find, str):
-        raise ModelError(
-            f"export_fmu: found find='{find}', expected a list of names; write ['{find}']", argument="find"
-        )
+        expected = f"expected a list of names; write ['{find}']"
+        raise ModelError(expected, place="export_fmu", found=Given("find", find))
     if find:
         return tuple(dict.fromkeys(_found(dae, name) for given in find for name in dae.expand(given))), ()
     known = {*dae.inputs, *(d.name for d in dae.flat.delays)}
@@ -165,8 +152,9 @@ def _found(dae: Dae, name: str) -> str:
     kind = "a parameter" if name in set(dae.parameters) else "an input" if name in set(dae.inputs) else ""
     if kind:
         raise ModelError(
-            f"export_fmu: find: {name} is {kind} of this FMU, expected variables that it computes; leave it out, "
+            f"find: {name} is {kind} of this FMU, expected variables that it computes; leave it out, "
             f"{kind.split()[1]}s are in the FMU anyway",
+            place="export_fmu",
             argument="find",
         )
     return name
@@ -183,10 +171,9 @@ def _token(formulas: Formulas, contents: Contents, fmi: str, solver: str, tolera
 def _described(
     formulas: Formulas,
     contents: Contents,
-    about: AboutFmu,
+    about: Build,
     token: str,
     kinds: Sequence[str],
-    experiment: Experiment,
 ) -> FmuDescription:
     """The record of the FMU, in the words of FMI 3, before its binaries are there."""
     name = formulas.dae.name
@@ -196,13 +183,13 @@ def _described(
     watched = bool(formulas.roots or formulas.blocks or formulas.switching.turns or formulas.delays)
     watches = {"model-exchange": {"needsCompletedIntegratorStep": watched}}
     return FmuDescription(
-        **vars(about),
+        **{own.name: getattr(about, own.name) for own in fields(AboutFmu)},
         name=name,
         token=token,
         interfaces=tuple(FmuInterface(kind, identifier, watches.get(kind, {})) for kind in kinds),
         variables=contents.variables,
         structure=contents.structure,
-        experiment=experiment,
+        experiment=about.experiment or DefaultExperiment(),
         terminals=contents.terminals,
         generated=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
     )

@@ -87,8 +87,8 @@ def reach_along(residual: ca.Function, start: ca.DM, begin: ca.DM, columns: ca.D
     by_y, by_q = (np.array(m) for m in both(start, begin))
     if not (np.all(np.isfinite(by_y)) and np.all(np.isfinite(by_q))):
         return ca.DM.zeros(begin.numel())
-    slopes = np.linalg.lstsq(by_y * np.array(columns).T, by_q, rcond=None)[0]
-    return ca.DM(np.sum(slopes**2, axis=0))
+    moves = np.linalg.lstsq(by_y * np.array(columns).T, by_q, rcond=None)[0]
+    return ca.DM(np.sum(moves**2, axis=0))
 
 
 def _trial(along: ca.Function, way: tuple[ca.DM, ca.DM], n: int) -> ca.Function:

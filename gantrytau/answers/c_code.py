@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import whole
+from gantrytau.border.refusal import Given, ModelError
 
 KEYWORDS = (
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
@@ -35,22 +36,16 @@ def c_source(
     `int name(const double **arg, double **res, long long *iw, double *w, int mem)`. Raises ModelError for a name that C does
     not allow, wrong numbers of names or directions, and what has no C code.
     """
+    for word, count in (("forward", forward), ("reverse", reverse)):
+        whole("c_source", word, count, least=0)
     name = name if name is not None else str(function.name())
     if not ca.Function.check_name(name) or name in KEYWORDS.split():
-        raise ModelError(
-            f"c_source: found the name '{name}', expected a C identifier that starts with a letter, without '__'; "
-            "give another name="
-        )
+        words = "expected a C identifier that starts with a letter, without '__'; give another"
+        raise ModelError(words, place="c_source", found=Given("name", name))
     for word, names, count in (("given", given, function.n_in()), ("find", find, function.n_out())):
         if isinstance(names, str) or (names and len(names) != count):
-            raise ModelError(
-                f"c_source: found {word}={names!r}, expected a list of {count} names, one for each; complete it"
-            )
-    for word, count in (("forward", forward), ("reverse", reverse)):
-        if isinstance(count, bool) or not isinstance(count, int) or count < 0:
-            raise ModelError(
-                f"c_source: found {word}={count!r}, expected a number of directions, 0 for none; give an integer"
-            )
+            words = f"expected a list of {count} names, one for each"
+            raise ModelError(words, place="c_source", found=Given(word, names))
     base = _renamed(function, name)
     functions = [base]
     functions += [base.jacobian()] if jacobian else []

@@ -1,6 +1,6 @@
 """What translation finds out about a model, in words: `check(model)` and `dae.diagnosis`."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -17,6 +17,7 @@ from gantrytau.flattening.flat_model import FlatModel, Loop, When
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
 
+LISTED = 8  # items of a list that are printed
 POOR = 1e4  # condition of the choice of states from which it deserves a remark
 FAR = 1e-6  # how far a start value moves, relative to the sizes there are, before that is worth a line
 
@@ -75,18 +76,16 @@ class Diagnosis(Record):
         lines += [
             f"  {_counted(self.aliases, 'alias', 'es')} removed, {_counted(self.differentiated, 'equation')} differentiated",
             f"  mobility {self.mobility}",
-            *_listed("redundant constraints", self.redundant),
+            *_listed("redundant constraints", self.redundant, always=True),
             f"  states (condition {self.condition:.3g}{poor}): {', '.join(self.states) or 'none'}",
             f"  {_counted(len(self.blocks), 'block')}, of them with several unknowns: {', '.join(several) or 'none'}",
-            *(_listed("assumed", self.assumed) if self.assumed else []),
-            *_listed("start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved]),
-            *(f"  {assembly}" for assembly in self.assemblies),
-            *(
-                _listed("several solutions at the start, of which the nearest is taken", self.ambiguous)
-                if self.ambiguous
-                else []
+            *_listed("assumed", self.assumed),
+            *_listed(
+                "start values moved", [f"{m.name} {m.asked:.6g} -> {m.found:.6g}" for m in self.moved], True
             ),
-            *(_listed("conditions", self.conditions) if self.conditions else []),
+            *(f"  {assembly}" for assembly in self.assemblies),
+            *_listed("several solutions at the start, of which the nearest is taken", self.ambiguous),
+            *_listed("conditions", self.conditions),
         ]
         return "\n".join(lines)
 
@@ -95,12 +94,12 @@ def _counted(count: int, word: str, ending: str = "s") -> str:
     return f"{count} {word}{'' if count == 1 else ending}"
 
 
-def _listed(title: str, items: Iterable[str], most: int = 8) -> list[str]:
-    items = list(items)
+def _listed(title: str, items: Sequence[str], always: bool = False) -> list[str]:
+    """Lines of a list, cut where it is long; always: also of an empty one."""
     if not items:
-        return [f"  {title}: none"]
-    more = [f"    and {len(items) - most} others"] if len(items) > most else []
-    return [f"  {title}:", *(f"    {item}" for item in items[:most]), *more]
+        return [f"  {title}: none"] if always else []
+    more = [f"    and {len(items) - LISTED} others"] if len(items) > LISTED else []
+    return [f"  {title}:", *(f"    {item}" for item in items[:LISTED]), *more]
 
 
 def check(model: Model) -> Diagnosis:

@@ -58,10 +58,7 @@ def function_through(
     x = [ca.MX.sym(n, *first.size_in(n)) for n in inside]
     *found, trusted = first.call(x)
     kept = [ca.MX.sym(n, *first.size_out(n)) for n in outside]
-    ways = [
-        ca.Function("quick", [*x, *kept], kept),
-        ca.Function("slow", [*x, *kept], second.call(x)),
-    ]
+    ways = [ca.Function("quick", [*x, *kept], kept), ca.Function("slow", [*x, *kept], second.call(x))]
     choose = ca.Function.if_else("by_value", *ways)
     return ca.Function(name, x, choose.call([trusted, *x, *found]), list(inside), list(outside))
 

@@ -150,7 +150,7 @@ def _sizes(residual: ca.SX, y: ca.SX, known: ca.SX) -> ca.Function:
 
 
 def _in_steps(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca.MX) -> ca.MX:
-    """Newton's method from one of some points on the way to the next, for equations whose slopes jump."""
+    """Newton's method from one of some points on the way to the next, for equations whose derivatives jump."""
     solve = ca.rootfinder(f"steps_{name}", "fast_newton", residual, {**NEWTON, "max_iter": 50})
     found = ca.MX(start)
     for share in np.linspace(0, 1, STEPS + 1)[1:]:

@@ -15,16 +15,17 @@ import numpy as np
 
 from gantrytau.answers.evaluation import evaluate, given_scalars, named_values
 from gantrytau.answers.linear_systems.discretisation import held
-from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_period
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.sample_to_sample import DrivenRows, from_sample_to_sample
-from gantrytau.border.refusal import InitializationError, ModelError, StructureError, did_you_mean
+from gantrytau.border.checks import number
+from gantrytau.border.refusal import Given, InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
-from gantrytau.flattening.flat_checks import refuse_delays, refuse_sticking, refuse_whens
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.simulation.to_result import labels
@@ -109,33 +110,29 @@ def linearize(
     no such point, StructureError if the equations are singular there, ModelError for unknown names, a period that
     does not fit, and a model with whens.
     """
-    dae = model if isinstance(model, Translated) else translate_model(model)
-    refuse_sticking(dae.flat)
-    refuse_delays(dae.flat)
-    refuse_whens(dae.flat)
     if period is not None:
-        check_period(f"linearize {dae.name}", period)
+        period = number("linearize", "period", period, unit="s", above=0)
+    dae = model if isinstance(model, Translated) else translate_model(model)
+    refuse_events(dae.flat, "frictions", "delays", "whens")
     if parameters:
         dae = _with_parameters(dae, parameters)
     columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))
     for name in columns:
         if name not in dae.inputs:
-            raise ModelError(
-                f"inputs: {name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}",
-                argument="inputs",
-            )
+            words = f"{name} is not an input of {dae.name}{did_you_mean(name, dae.inputs)}"
+            raise ModelError(words, place="inputs", argument="inputs")
     _expanded(dae, "outputs", names(outputs or ()))
     dae = _with_outputs(dae, names(outputs or ()))
     values = _steady(dae, dict(at or {})) if steady else _completed(dae, dict(at or {}))
-    slopes = _Slopes(dae, values)
-    if slopes.condition > POOR:
+    linear = _LinearEquations(dae, values)
+    if linear.condition > POOR:
         # states are a matter of the point: the height of a pendulum is none at its lowest
         dae = translate_flat(dae.flat, dae.request, values)
-        slopes = _Slopes(dae, values)
-    slopes.require_regular()
+        linear = _LinearEquations(dae, values)
+    linear.require_regular()
     wanted = names(outputs) if outputs is not None else (dae.outputs or dae.states)
     rows = tuple(n for name in wanted for n in dae.expand(name))
-    (A, B, C, D), period = _matrices(dae, slopes, rows, columns, period)
+    (A, B, C, D), period = _matrices(dae, linear, rows, columns, period)
     states = (*dae.states, *(s.name for s in dae.flat.sampled))
     # what is held, and not asked for at the next instant, is no state
     kept = [k for k in range(len(A)) if k < len(dae.states) or np.any(A[:, k]) or np.any(C[:, k])]
@@ -156,7 +153,7 @@ def _expanded(dae: Translated, which: str, wanted: Sequence[str]) -> tuple[str, 
 
 def _matrices(
     dae: Translated,
-    slopes: "_Slopes",
+    linear: "_LinearEquations",
     rows: Sequence[str],
     columns: Sequence[str],
     period: float | None,
@@ -166,7 +163,7 @@ def _matrices(
     chosen, kept = ([dae.known.index(n) for n in names] for names in (columns, [s.name for s in sampled]))
 
     def of(expressions: Sequence[ca.SX], words: Sequence[str]) -> DrivenRows:
-        by_states, by_known = slopes.of(expressions, words)
+        by_states, by_known = linear.of(expressions, words)
         return DrivenRows(by_states, by_known[:, kept], by_known[:, chosen])
 
     rates = of([dae.reduced.chains.rate(n) for n in dae.choice.states], [f"der({n})" for n in dae.states])
@@ -186,9 +183,8 @@ def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translat
     scalars = given_scalars(dae, parameters)
     for name in scalars:
         if name not in dae.table.symbols:
-            raise ModelError(
-                f"parameters: {name} is a variable of {dae.name}; give it in at=", argument="parameters"
-            )
+            words = f"{name} is a variable of {dae.name}; give it in "
+            raise ModelError(words, Given("at"), place="parameters", argument="parameters")
     return retranslate(dae, with_values(dae.flat, scalars))
 
 
@@ -207,9 +203,8 @@ def _checked(dae: Translated, at: Mapping[str, Any]) -> dict[str, float]:
     scalars = given_scalars(dae, at)
     for name in scalars:
         if name in dae.table.symbols:
-            raise ModelError(
-                f"at: {name} is a parameter of {dae.name}; give it in parameters=", argument="at"
-            )
+            words = f"{name} is a parameter of {dae.name}; give it in "
+            raise ModelError(words, Given("parameters"), place="at", argument="at")
     return scalars
 
 
@@ -249,36 +244,33 @@ def _steady(dae: Translated, at: dict[str, Any]) -> dict[str, float]:
         except InitializationError as error:
             failures.append(error)
     raise InitializationError(
-        f"{failures[-1]}. Every derivative is zero there, and {', '.join(at) or 'nothing'} held: hold less in at=, start "
-        "nearer to a point of rest, or linearize about a motion with steady=False"
-    )
+        f"{failures[-1]}. Every derivative is zero there, and {', '.join(at) or 'nothing'} held: hold less in ",
+        Given("at"), ", start nearer to a point of rest, or linearize about a motion with ", Given("steady", False),
+    )  # fmt: skip
 
 
 def _hold(dae: Translated, scalars: Mapping[str, float], values: dict[str, float]) -> frozenset[str]:
     """Enter given values; names of the symbols that they fix."""
     held: set[str] = set()
-    for name, number in scalars.items():
+    for name, given in scalars.items():
         if name == dae.flat.time.name():
-            values[name] = number
+            values[name] = given
             continue
         alias = dae.root(name)
         if alias is None:
-            raise ModelError(
-                f"at: {name} follows from other variables of {dae.name}; give those", argument="at"
-            )
+            raise ModelError(f"{name} follows from other variables; give those", place="at", argument="at")
         offset, still = dae.number(alias.offset), alias.root is None or alias.order > 0
-        value = number - offset if alias.root is None else dae.number(alias.root_value(number))
-        if still and abs(value) > 1e-9 * max(1.0, abs(number)):
-            raise InitializationError(
-                f"at: {name} is {number:g}, but at rest it is {offset:g}; leave it out, or linearize with steady=False"
-            )
+        value = given - offset if alias.root is None else dae.number(alias.root_value(given))
+        if still and abs(value) > 1e-9 * max(1.0, abs(given)):
+            words = f"{name} is {given:g}, but at rest it is {offset:g}; leave it out, or linearize with "
+            raise InitializationError(words, Given("steady", False), place="at", argument="at")
         if not still:
             values[alias.symbol] = value
             held.add(alias.symbol)
     return frozenset(held)
 
 
-class _Slopes:
+class _LinearEquations:
     """All equations of a model, linear at a point, solved for what is no state."""
 
     def __init__(self, dae: Translated, values: Mapping[str, float]):

@@ -7,6 +7,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from numbers import Real
 from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
@@ -32,7 +33,7 @@ def check_words(function: Callable[..., Any], values: Mapping[str, Any], place: 
     """ModelError for an argument of `function` whose `Literal` does not list the value found."""
     for argument, words in literals(function).items():
         if argument in values:
-            one_of(place or function.__name__, argument, values[argument], words)
+            one_of(function.__name__ if place is None else place, argument, values[argument], words)
 
 
 @cache
@@ -81,16 +82,25 @@ def whole(place: str, argument: str, found: Any, *, least: int | None = None, mo
 
 
 def array(
-    place: str, argument: str, found: Any, *shapes: Shape, unit: str | None = None, finite: bool = True
+    place: str,
+    argument: str,
+    found: Any,
+    *shapes: Shape,
+    unit: str | None = None,
+    finite: bool = True,
+    least: float | None = None,
+    above: float | None = None,
 ) -> np.ndarray:
     """An array of numbers in SI of one of the shapes, None for any length; texts bring their unit.
 
-    ModelError for another shape, for what is no number, and unless `finite` is False for nan and infinity.
+    ModelError for another shape, for what is no number or beyond its limit, and unless `finite` is False for nan and
+    infinity.
     """
-    wanted = f"numbers{_in(unit)}{_shaped(shapes)}"
+    limits = _limits(least, above, None, None)
+    wanted = f"numbers{limits}{_in(unit)}{_shaped(shapes)}"
     try:
         values = np.asarray(_si(place, argument, found, unit) if unit else found)
-        if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and values.size):
+        if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and _numeric(values)):
             raise TypeError
         values = values.astype(float)
     except (TypeError, ValueError):
@@ -98,12 +108,23 @@ def array(
     if shapes and not any(_fits(values.shape, shape) for shape in shapes):
         size = " x ".join(map(str, values.shape)) or "a single number"
         raise ModelError(f"found {argument} of {size}, expected {wanted}", place=place, argument=argument)
-    if finite and not np.all(np.isfinite(values)):
-        first = tuple(map(int, np.argwhere(~np.isfinite(values))[0]))
+    wrong = ~np.isfinite(values) if finite else np.zeros(values.shape, dtype=bool)
+    if least is not None:
+        wrong = wrong | (values < least)
+    if above is not None:
+        wrong = wrong | (values <= above)
+    if np.any(wrong):
+        first = tuple(map(int, np.argwhere(wrong)[0]))
         where = f"[{', '.join(map(str, first))}]" if first else ""
-        message = f"found {argument}{where} = {values[first]}, expected finite numbers{_in(unit)}"
+        message = f"found {argument}{where} = {values[first]}, expected finite numbers{limits}{_in(unit)}"
         raise ModelError(message, place=place, argument=argument)
     return values
+
+
+def _numeric(values: np.ndarray) -> bool:
+    """Whether an array of objects holds numbers alone: a symbol of CasADi makes a float too, nan."""
+    kinds = {type(value) for value in values.flat}
+    return bool(kinds) and all(issubclass(kind, Real) and kind is not bool for kind in kinds)
 
 
 def instance(place: str, argument: str, found: Any, kinds: Any, expected: str | None = None) -> Any:

@@ -86,12 +86,17 @@ def named(text: str, folder: Path, library: str) -> Any:
     if not isinstance(made, type) and not asked.arguments:
         return made
     records = getattr(module, "prototypes", None) or importlib.import_module(f"{library}.prototypes")
-    for one in asked.prototypes:
-        if not hasattr(records, one):
-            raise ModelError(f"there is no prototype '{one}'")
     pairs = (argument.partition("=") for argument in asked.keywords)
     keywords = {key.strip(): _value(value.strip()) for key, _, value in pairs}
-    return made(*(getattr(records, one) for one in asked.prototypes), **keywords)
+    return made(*(prototype(one, records) for one in asked.prototypes), **keywords)
+
+
+def prototype(name: str, records: Any) -> Any:
+    """The prototype of a name among records, a module with `names()`; ModelError where there is none."""
+    names = records.names() if hasattr(records, "names") else vars(records)
+    if name not in names:
+        raise ModelError(f"there is no prototype '{name}'{similar(name, [*names])}")
+    return getattr(records, name)
 
 
 def _value(text: str) -> Any:
@@ -121,9 +126,22 @@ def load(file: Path) -> ModuleType:
     assert specification.loader is not None
     module = importlib.util.module_from_spec(specification)
     sys.modules[module.__name__] = module
-    with _loading(file.name, file.parent, file):
-        specification.loader.exec_module(module)
+    before = set(sys.modules)
+    importlib.invalidate_caches()
+    try:
+        with _loading(file.name, file.parent, file):
+            specification.loader.exec_module(module)
+    finally:
+        for name in sys.modules.keys() - before:
+            if _is_neighbour(name.partition(".")[0], file.parent, before):
+                del sys.modules[name]
     return module
+
+
+def _is_neighbour(name: str, folder: Path, before: set[str]) -> bool:
+    """Whether a module is a file or a package in a folder, imported just now: another robot may have one of that name."""
+    source = getattr(sys.modules.get(name), "__file__", None) if name not in before else None
+    return source is not None and Path(source) in (folder / f"{name}.py", folder / name / "__init__.py")
 
 
 def import_by_name(name: str, source: Path | None) -> ModuleType | None:

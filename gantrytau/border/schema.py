@@ -20,13 +20,15 @@ WORDS = {
 }
 LARGEST = {"m": 50.0, "rad": 2 * math.pi, "m/s": 50.0}  # more was not written in SI
 EXAMPLES = {"m": "mm", "rad": "deg", "s": "ms", "m/s": "mm/s"}
+ELSEWHERE = {"table": "a table", "texts": 'a list of texts in quotes, as ["x", "y"]', "any": "a value"}
 
 
 @dataclass(frozen=True)
 class Value:
     """What a key holds: a number, vector or table of numbers in a unit, a whole number or a text.
 
-    unit: of WORDS, several separated by commas, or "whole", "text", or "bodies", which are read elsewhere;
+    unit: of WORDS, several separated by commas, or "whole", "text", "table" (one or several), "texts" or "any", the last
+    three of which are read elsewhere;
     shapes: those allowed, None for any number of rows; least: the smallest number allowed, or above: what it must exceed;
     words: of which a text must be one.
     """
@@ -41,11 +43,24 @@ class Value:
         """The value in SI, lists as lists; ModelError for anything else."""
         if self.unit == "text":
             return self._text(place, found)
-        if self.unit == "bodies":
+        if self.unit == "table":
+            return self._tables(place, found)
+        if self.unit == "texts" and not (isinstance(found, list) and all(isinstance(x, str) for x in found)):
+            raise ModelError(f"{place}: found {_short(found)}, expected {self.expected()}")
+        if self.unit in ("any", "bodies", "texts"):
             return found
         if not any(_has(found, shape) for shape in self.shapes):
             raise ModelError(f"{place}: found {_short(found)}, expected {self.expected()}")
         return self._numbers(place, found)
+
+    def _tables(self, place: str, found: Any) -> Any:
+        several = self.shapes != ((),)
+        tables = found if several and isinstance(found, list) else [found]
+        if all(isinstance(one, Mapping) for one in tables) and several == isinstance(found, list):
+            return found
+        name = place.rpartition(": ")[2]
+        expected = f"a table for each, [[{name}]]" if several else f"a table, [{name}]"
+        raise ModelError(f"{place}: found {_short(found)}, expected {expected}")
 
     def _text(self, place: str, found: Any) -> str:
         if not isinstance(found, str) or not found.strip():
@@ -100,6 +115,8 @@ class Value:
         """What it must be, in words."""
         if self.unit == "text":
             return "a text in quotes" + (f": {', '.join(self.words)}" if self.words else "")
+        if self.unit in ELSEWHERE:
+            return ELSEWHERE[self.unit]
         shapes = [_in_words(shape) for shape in self.shapes]
         return f"{' or '.join(shapes)}{self._unit() if shapes == [''] else f', each {self._unit()}'}"
 

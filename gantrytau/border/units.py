@@ -208,14 +208,15 @@ def known_scale(place: str, text: Any, unit: str | None, found_as: str = "") -> 
     found_as: the whole text, where the unit stands behind a number.
     """
     if not isinstance(text, str):
-        raise ModelError(f"{place}: found {text!r}, expected a unit as text, as 'deg'")
+        raise ModelError(f"found {text!r}, expected a unit as text, as 'deg'", place=place)
     try:
         found = scale(text)
     except ModelError as error:
-        raise ModelError(f"{place}: {error}") from None
+        raise error.within(place) from None
     if unit is None:
         raise ModelError(
-            f"{place}: found '{found_as or text}' for what has no unit, expected none; declare its unit, as unit='m'"
+            f"found '{found_as or text}' for what has no unit, expected none; declare its unit, as unit='m'",
+            place=place,
         )
     if not found.measures(unit):
         turns = (
@@ -224,7 +225,8 @@ def known_scale(place: str, text: Any, unit: str | None, found_as: str = "") -> 
             else ""
         )
         raise ModelError(
-            f"{place}: found '{found_as or text}', {found.kind}, expected {_expected(unit)}; write {_examples(unit)}.{turns}"
+            f"found '{found_as or text}', {found.kind}, expected {_expected(unit)}; write {_examples(unit)}.{turns}",
+            place=place,
         )
     return found
 
@@ -275,8 +277,7 @@ def given(place: str, value: Any, unit: str | None) -> Any:
         try:
             found = known_scale(place, written, unit, value.strip()).si(number)
         except ModelError as error:
-            words = str(error)
-            raise ModelError(words if words.startswith(place) else f"{place}: {words}") from None
+            raise error if error.place == place else error.within(place) from None
         return found.tolist() if isinstance(found, np.ndarray) else found
     if isinstance(value, np.ndarray) and value.dtype.kind in "UO":
         value = value.tolist()
@@ -313,10 +314,12 @@ def _split(place: str, text: str, unit: str | None) -> tuple[Any, str]:
             number = None
     if match is None or number is None:
         comma = "; decimals have a point" if re.search(r"\d,\d", text) else ""
-        raise ModelError(f"{place}: found '{text}', expected a number and its unit, as '{example}'{comma}")
+        raise ModelError(
+            f"found '{text}', expected a number and its unit, as '{example}'{comma}", place=place
+        )
     if not match["unit"] and unit != "1":
         raise ModelError(
-            f"{place}: found '{text}' in quotes and without a unit, expected '{example}', or a number without quotes, which "
-            "is in SI"
+            f"found '{text}' in quotes and without a unit, expected '{example}', or a number without quotes, which is in SI",
+            place=place,
         )
     return number, match["unit"] or "1"

@@ -2,12 +2,11 @@
 
 from dataclasses import asdict
 
-import typer
-
+import gantrytau
 from gantrytau.border import source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
-from gantrytau.commands.printing.reporting import FAULT, as_json, busy, fail, reporting
+from gantrytau.commands.printing.reporting import FAULT, answered, busy, fail, reporting
 
 
 def check(
@@ -18,17 +17,11 @@ def check(
     Prints the numbers of equations and unknowns, how many ways the mechanism can move, redundant constraints,
     the states and the systems of equations to be solved. A model with a fault gets a message that names it.
     """
-    import gantrytau
-
     with reporting(json, source_of(model)):
         chosen = build(model, prototype, set_ or ())
         with busy(f"translating {chosen.name}"):
             diagnosis = gantrytau.check(chosen.model)
-        if diagnosis.missing and json:
-            fail(diagnosis.missing, FAULT, json, **asdict(diagnosis), prototype=chosen.prototype)
-        elif diagnosis.missing:
-            fail(str(diagnosis), FAULT, json)
-        elif json:
-            typer.echo(as_json({**asdict(diagnosis), "prototype": chosen.prototype}))
-        else:
-            typer.echo(str(diagnosis))
+        record = {**asdict(diagnosis), "prototype": chosen.prototype}
+        if diagnosis.missing:
+            fail(diagnosis.missing if json else str(diagnosis), FAULT, json, **record)
+        answered(json, record, str(diagnosis))

@@ -1,47 +1,44 @@
 """`gantrytau study`: a model or a function for many values and seeds, as a file describes it."""
 
+import statistics
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from gantrytau import SolveError
+import gantrytau
+from gantrytau import Result, SolveError, Study
 from gantrytau.border import listed
 from gantrytau.commands.arguments.display_option import Displayed, displayed
+from gantrytau.commands.arguments.option import printing
 from gantrytau.commands.arguments.options import Json, Plotted, To
 from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.arguments.study_file import EXAMPLE, StudyFile, read_study
+from gantrytau.commands.arguments.study_file import EXAMPLE, POLICY, read_study
 from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import (
+    FAULT,
     INTERRUPTED,
-    CommandError,
-    as_json,
+    answered,
     fail,
     note,
+    print_table,
     reporting,
-    writable,
     writable_place,
+    written,
 )
-from gantrytau.commands.printing.spelling import Spelling
-
-if TYPE_CHECKING:
-    from gantrytau import Study
+from gantrytau.commands.printing.spelling import spelled
 
 SHOWN = 12  # failures that are printed
-SPELLING = Spelling(
-    ("study", "simulate"),
-    {n: n for n in ("stop", "over", "seeds", "combine", "inputs", "outputs", "tolerance", "points")}
-    | {"folder": "--folder", "where": "--where", "parameters": "set"},
-)
+NAMES = {key: key for key in (*POLICY, "over", "inputs")} | {"folder": "--folder", "where": "--where"}
 
 
 def study(
     file: Annotated[
-        Path | None,
+        Path,
         typer.Argument(
             metavar="FILE", help="The study, as swings.toml; --example prints one.", show_default=False
         ),
-    ] = None,
+    ],
     folder: Annotated[
         Path | None,
         typer.Option(
@@ -63,57 +60,40 @@ def study(
     plot: Plotted = None,
     to: To = None,
     display: Displayed = None,
-    example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example", help="Print a file to begin with.", is_eager=True, callback=printing(EXAMPLE)
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Simulate a model, or call a function, for many values and seeds, on all processors or on a cluster.
 
     A case that fails is told and does not stop the others; exit code 1 if all failed. Ctrl-C keeps what --folder holds.
     """
-    if example:
-        typer.echo(EXAMPLE, nl=False)
-        return
-    with reporting(json, None, SPELLING):
-        if file is None:
-            raise CommandError(
-                "no file: expected that of a study; `gantrytau study --example > study.toml` begins one"
-            )
+    with reporting(json, None, NAMES | {"parameters": "set"}):
         drawn = listed(plot)
         place, units = picture_output.place(drawn, to), displayed(display)
         writable_place("--output", output, ".nc")
         asked = read_study(file)
-        keywords = dict(asked.keywords)
-        keywords |= {k: v for k, v in (("folder", folder), ("where", where)) if v is not None}
-        found = _found(asked, keywords, json)
-        files = []
-        if output is not None:
-            with writable(output):
-                files.append(str(found.save(output)))
+        chosen: dict[str, Any] = {k: v for k, v in (("folder", folder), ("where", where)) if v is not None}
+        try:
+            found = gantrytau.study(asked.subject, **{**asked.keywords, **chosen})
+        except SolveError as error:
+            if not error.interrupted:
+                raise
+            fail(spelled(error), INTERRUPTED, json, kind=type(error).__name__)
+        files: list[Any] = written(output, found.save)
         if place:
             files += picture_output.draw(found, drawn, place, units)
-        if json:
-            typer.echo(as_json(_summary(asked.name, found, files)))
-        else:
-            _show(asked.name, found, files)
+        answered(json, _summary(asked.name, found), lambda: _show(asked.name, found), files)
         if len(found.failures) == len(found):
-            raise typer.Exit(1)
-
-
-def _found(asked: StudyFile, keywords: dict[str, Any], json: bool) -> "Study":
-    import gantrytau
-
-    try:
-        return gantrytau.study(asked.subject, **keywords)
-    except SolveError as error:
-        if not error.interrupted:
-            raise
-        fail(SPELLING.of(error), INTERRUPTED, json, kind=type(error).__name__)
+            raise typer.Exit(FAULT)
 
 
 def _ends(value: Any) -> dict[str, float]:
     """What is told of one case: the last values of its variables, numbers that a function returned."""
-    from gantrytau import Result
-
     if isinstance(value, Result):
         return {name: value.final(name) for name in value.names}
     if isinstance(value, dict):
@@ -121,7 +101,7 @@ def _ends(value: Any) -> dict[str, float]:
     return {"value": value} if isinstance(value, (int, float)) else {}
 
 
-def _summary(name: str, found: "Study", files: list[str]) -> dict[str, Any]:
+def _summary(name: str, found: Study) -> dict[str, Any]:
     failed = {failure.case.number: failure for failure in found.failures}
     cases = []
     for case, value in zip(found.cases, found.values, strict=True):
@@ -131,18 +111,11 @@ def _summary(name: str, found: "Study", files: list[str]) -> dict[str, Any]:
         else:
             row |= {"final": _ends(value)}
         cases.append(row)
-    return {"study": name, "cases": cases, "failures": len(failed), "files": files}
+    return {"study": name, "cases": cases, "failures": len(failed)}
 
 
-def _show(name: str, found: "Study", files: list[str]) -> None:
+def _show(name: str, found: Study) -> None:
     """What the cases end with, as a table over all of them, and those that failed."""
-    import statistics
-
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
     axes = " x ".join(f"{n} ({k})" for n, k in zip(found.axes.names, found.axes.shape, strict=True))
     typer.echo(f"{name}: {len(found)} cases over {axes}, {len(found.failures)} failed")
     columns: dict[str, list[float]] = {}
@@ -150,17 +123,10 @@ def _show(name: str, found: "Study", files: list[str]) -> None:
         for key, number in _ends(value).items():
             columns.setdefault(key, []).append(number)
     if columns and len(columns) <= SHOWN:
-        table = Table(box=SIMPLE, pad_edge=False)
-        table.add_column("at the end", no_wrap=True)
-        for heading in ("least", "median", "greatest"):
-            table.add_column(heading, justify="right", no_wrap=True)
-        for key, numbers in columns.items():
-            shown = (min(numbers), statistics.median(numbers), max(numbers))
-            table.add_row(Text(key), *(f"{number:.6g}" for number in shown))
-        Console().print(table)
+        shown = {key: (min(n), statistics.median(n), max(n)) for key, n in columns.items()}
+        rows = [(key, *(f"{number:.6g}" for number in numbers)) for key, numbers in shown.items()]
+        print_table(("at the end", "least", "median", "greatest"), rows)
     for failure in found.failures[:SHOWN]:
         note(f"Failed: {failure}")
     if len(found.failures) > SHOWN:
         note(f"and {len(found.failures) - SHOWN} more; --json tells all")
-    for file in files:
-        typer.echo(f"Written: {file}")

@@ -1,37 +1,32 @@
 """`gantrytau view`: a model in a pose, or the motion of a result that was saved, as a page for any browser."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
+import gantrytau
+from gantrytau import animate, translate
 from gantrytau.border import source_of
-from gantrytau.commands.arguments.model_choice import Chosen, build
+from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
 from gantrytau.commands.arguments.saved_results import read_result
-from gantrytau.commands.arguments.values import check_names, number, split
+from gantrytau.commands.arguments.values import check_names, pairs
 from gantrytau.commands.printing.reporting import (
     CommandError,
-    as_json,
+    answered,
     busy,
     reporting,
-    writable,
     writable_place,
-)
-from gantrytau.commands.printing.spelling import Spelling
-
-if TYPE_CHECKING:
-    from gantrytau import Dae
-
-SPELLING = Spelling(
-    ("view", "animate"),
-    {"speed": "--speed", "pose": "--pose"},
-    exactly={"without outputs=[...]": "without --outputs"},
+    written,
 )
 
 
+@serves(animate, speed="Seconds of the motion in one second, with --result.")
 def view(
     model: ModelName,
+    speed: float,
     pose: Annotated[
         list[str] | None,
         typer.Option(
@@ -47,7 +42,6 @@ def view(
             show_default=False,
         ),
     ] = None,
-    speed: Annotated[float, typer.Option(help="Seconds of the motion in one second, with --result.")] = 1.0,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write this page.", show_default="MODEL.html")
     ] = None,
@@ -59,46 +53,23 @@ def view(
 
     It needs the extra `view`; `gantrytau doctor` says whether that is there, and how to get it.
     """
-    with reporting(json, source_of(model), SPELLING):
+    with reporting(json, source_of(model)):
         if pose and result:
             raise CommandError(
                 "found --pose and --result, expected one of them; a motion has poses of its own"
             )
         writable_place("--output", output, ".html", ".htm")
         motions = [read_result(file, "--result") for file in result or ()]
-        values = {
-            name: number("--pose", name, value) for name, value in (split("--pose", p) for p in pose or ())
-        }
+        values = pairs("--pose", pose)
         chosen = build(model, prototype, set_ or ())
-        place = output or Path(f"{chosen.name}.html")
         with busy(f"translating {chosen.name}"):
-            dae = _translated(chosen)
+            dae = translate(chosen.model, events=True)
         check_names("--pose", values, dae.expand)
-        page = _page(dae, values, motions, speed)
-        with writable(place):
-            page.save(place)
-        if json:
-            size = len(page.text.encode())
-            typer.echo(
-                as_json(
-                    {"model": chosen.name, "prototype": chosen.prototype, "file": str(place), "bytes": size}
-                )
-            )
+        if motions:
+            names = [motion.title for motion in motions] if len(motions) > 1 else None
+            page = animate(motions, model=dae, speed=speed, names=names)
         else:
-            typer.echo(f"Written: {place}")
-
-
-def _translated(chosen: Chosen) -> "Dae":
-    from gantrytau import translate
-
-    return translate(chosen.model, events=True)
-
-
-def _page(dae: "Dae", pose: dict[str, Any], motions: list[Any], speed: float) -> Any:
-    from gantrytau import animate
-    from gantrytau import view as show
-
-    if not motions:
-        return show(dae, pose)
-    names = [motion.title for motion in motions] if len(motions) > 1 else None
-    return animate(motions, model=dae, speed=speed, names=names)
+            page = gantrytau.view(dae, values)
+        files = written(output or Path(f"{chosen.name}.html"), page.save)
+        record = {**chosen.record("model"), "file": files[0], "bytes": len(page.text.encode())}
+        answered(json, record, None, files)

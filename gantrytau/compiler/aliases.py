@@ -113,9 +113,7 @@ class _Terms:
 
     def left(self) -> list[tuple[Any, float]]:
         """The terms that do not cancel."""
-        return [
-            (key, factor) for key, factor in self.factors.items() if abs(factor) > NOISE * self.sizes[key]
-        ]
+        return [(key, f) for key, f in self.factors.items() if abs(f) > NOISE * self.sizes[key]]
 
 
 def eliminate_aliases(flat: FlatModel, table: ParameterTable, known: frozenset[str]) -> Reduced:
@@ -258,9 +256,7 @@ class _Elimination:
         return found
 
     def _steady(self, expression: ca.SX) -> bool:
-        return expression.is_constant() or all(
-            leaf.name() in self.parameters for leaf in ca.symvar(expression)
-        )
+        return expression.is_constant() or all(x.name() in self.parameters for x in ca.symvar(expression))
 
     def root(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.border.units import given
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
-from gantrytau.flattening.shapes import fits
+from gantrytau.flattening.shapes import elements_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,51 +49,33 @@ def with_values(flat: FlatModel, values: Mapping[str, object]) -> FlatModel:
     if not values:
         return flat
     if not isinstance(values, Mapping):
-        raise ModelError(
-            f"{flat.name}: found {type(values).__name__} as parameters, expected names and their values, {{name: value}}"
-        )
+        raise ModelError("expected {name: value}", place=flat.name, found=Given("parameters", values))
     remaining = dict(values)
     known = [*(p.name for p in flat.parameters), *(e for p in flat.parameters for e in p.elements)]
     for name in values:
+        variable = name.removesuffix(".start")
+        if name not in known and (variable in flat.vectors or variable in flat.scalars):
+            words = f"{flat.name} has no parameter '{name}'; {variable} is a variable, its start goes in "
+            raise ModelError(words, Given("starts"), argument="parameters")
         if name not in known:
-            raise ModelError(f"{flat.name} has no parameter '{name}'{_remedy(flat, name, known)}")
+            words = f"{flat.name} has no parameter '{name}'{did_you_mean(name, known)}"
+            raise ModelError(words, argument="parameters")
     flat.refuse_twice("parameters", values)
     return replace(flat, parameters=tuple(_with_value(p, remaining) for p in flat.parameters))
 
 
-def _remedy(flat: FlatModel, name: str, known: list[str]) -> str:
-    """The end of a message about what is no parameter."""
-    variable = name.removesuffix(".start")
-    if variable in flat.vectors or variable in flat.scalars:
-        return f"; {variable} is a variable, simulate takes another start value of it as starts={{'{variable}': ...}}"
-    return did_you_mean(name, known)
-
-
 def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatParameter:
-    elements = list(parameter.value)
-    if parameter.name in values:
-        array = _numbers(parameter.name, values[parameter.name], parameter.unit)
-        if not fits(array.shape, parameter.shape):
-            raise ModelError(f"{parameter.name}: value has shape {array.shape}, expected {parameter.shape}")
-        elements = [ca.SX(float(x)) for x in array.ravel(order="F")]
+    def numbers(name: str, shape: tuple[int, ...]) -> list[ca.SX]:
+        place = f"parameters: {name}"
+        found = elements_of(place, given(place, values[name], parameter.unit), shape)
+        return [ca.SX(x) for x in found]
+
+    own = parameter.name in values
+    elements = numbers(parameter.name, parameter.shape) if own else list(parameter.value)
     for index, name in enumerate(parameter.elements):
         if name in values and name != parameter.name:
-            number = _numbers(name, values[name], parameter.unit)
-            if not fits(number.shape, ()):
-                raise ModelError(f"{name}: value has shape {number.shape}, expected ()")
-            elements[index] = ca.SX(float(number.item()))
-    for name, element in zip(parameter.elements, elements, strict=True):
-        if element.is_constant() and not np.isfinite(float(element)):
-            raise ModelError(f"{name}: value is {element}, expected a finite number")
+            (elements[index],) = numbers(name, ())
     return replace(parameter, value=tuple(elements))
-
-
-def _numbers(name: str, value: object, unit: str | None) -> np.ndarray:
-    value = given(f"parameters: {name}", value, unit)
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(f"parameters: {name}: found {value!r}, expected a number or an array") from None
 
 
 def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> ParameterTable:
@@ -109,9 +91,8 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
         foreign = [other for other in others if other not in bindings]
         if foreign:
             raise ModelError(
-                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a "
-                "parameter is "
-                "constant, declare it Real if it is not"
+                f"{name}: found the variable {foreign[0]} in its value, expected parameters only; a parameter is constant, "
+                "declare it Real if it is not"
             )
     order = _sorted(needs)
     for name in reversed(order):  # what decides a folded value is folded too
@@ -141,15 +122,8 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
             expressions[name] = ca.SX(values[name])
         elif needs[name] and name not in keep:
             inner = [n for n in needs[name] if n in expressions]
-            expressions[name] = (
-                ca.substitute(
-                    binding,
-                    ca.vertcat(*(symbols[n] for n in inner)),
-                    ca.vertcat(*(expressions[n] for n in inner)),
-                )
-                if inner
-                else binding
-            )
+            old, new = (ca.vertcat(*(of[n] for n in inner)) for of in (symbols, expressions))
+            expressions[name] = ca.substitute(binding, old, new) if inner else binding
         else:
             independent.append(name)
     _check_limits(flat, values)

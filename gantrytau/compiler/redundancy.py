@@ -12,10 +12,10 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import InitializationError
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.compiler.refusals import open_loops, overdriven
+from gantrytau.compiler.refusals import open_loops
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.consistency import Level, solve_levels
 from gantrytau.compiler.start.start_values import StartValues, start_values
@@ -91,7 +91,7 @@ def without_redundant(
         matrices = [_over_course(constraints, course)[-1]]
     else:
         poses = [closed, *_poses(constraints, guess, closed, flat.name)]
-        matrices = [_matrix(_slopes(constraints, pose)) for pose in poses]
+        matrices = [_matrix(_jacobian(constraints, pose)) for pose in poses]
     kept = _independent(matrices, constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
     redundant = tuple(e for k, e in enumerate(constraints.equations) if k not in kept)
@@ -123,8 +123,8 @@ def _over_course(constraints: Constraints, course: Sequence[Mapping[str, float]]
 
     A row may shrink to nothing at a pose, where others do not: of length one it would look as good as these.
     """
-    each = np.array([_slopes(constraints, pose) for pose in course])
-    found = each * np.median([balance(slopes)[1] for slopes in each], axis=0)
+    each = np.array([_jacobian(constraints, pose) for pose in course])
+    found = each * np.median([balance(jacobian)[1] for jacobian in each], axis=0)
     sizes = np.max(np.linalg.norm(found, axis=2, keepdims=True), axis=0)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
@@ -196,13 +196,13 @@ def _nearest(constraints: Constraints, guess: StartValues) -> dict[str, float]:
     def residuals(x: np.ndarray) -> np.ndarray:
         return weights * level.look(_at(start, place, x))[0]
 
-    def slopes(x: np.ndarray) -> np.ndarray:
+    def jacobian(x: np.ndarray) -> np.ndarray:
         return weights[:, None] * level.jacobian(level.look(_at(start, place, x))[1])[:, place]
 
     random, found = np.random.default_rng(0), residuals(start[place])
     for attempt in range(TRIES if place else 0):
         x = start[place] + (random.uniform(-np.pi, np.pi, len(place)) if attempt else 0.0)
-        reached = least_squares(residuals, x, slopes, x_scale="jac", ftol=EXACT, xtol=EXACT, gtol=EXACT).fun
+        reached = least_squares(residuals, x, jacobian, x_scale="jac", ftol=EXACT, xtol=EXACT, gtol=EXACT).fun
         found = min(found, reached, key=np.linalg.norm)
     return dict(zip(level.names[constraints.firm :], found[constraints.firm :].tolist(), strict=True))
 
@@ -213,18 +213,18 @@ def _at(numbers: np.ndarray, place: Sequence[int], values: np.ndarray) -> np.nda
     return found
 
 
-def _slopes(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
+def _jacobian(constraints: Constraints, values: Mapping[str, float], known: Sequence[str] = ()) -> np.ndarray:
     """Jacobian of the rows by unknowns and `known`."""
     level = constraints.level
-    _, slopes = level.look(np.array([values[n] for n in level.leaves]))
+    _, nonzeros = level.look(np.array([values[n] for n in level.leaves]))
     place = {n: k for k, n in enumerate(level.leaves)}
-    return level.jacobian(slopes)[:, [place[n] for n in (*constraints.moving, *known)]]
+    return level.jacobian(nonzeros)[:, [place[n] for n in (*constraints.moving, *known)]]
 
 
-def _matrix(slopes: np.ndarray) -> np.ndarray:
+def _matrix(jacobian: np.ndarray) -> np.ndarray:
     """The rows by unknowns in sizes of their own, each row of length one; what is zero stays zero."""
-    rows, columns = balance(slopes)
-    found = rows * slopes * columns
+    rows, columns = balance(jacobian)
+    found = rows * jacobian * columns
     sizes = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(sizes > RANK, found / np.maximum(sizes, RANK), 0.0)
 
@@ -239,9 +239,9 @@ def _poses(
     loose = replace(guess, fixed=frozenset(), started=frozenset(), chosen=frozenset())
     here = dict(closed)
     for _ in range(POSES):
-        slopes = _slopes(constraints, here)
-        rows, columns = balance(slopes)
-        _, sizes, right = np.linalg.svd(_matrix(slopes))
+        jacobian = _jacobian(constraints, here)
+        rows, columns = balance(jacobian)
+        _, sizes, right = np.linalg.svd(_matrix(jacobian))
         free = right[np.count_nonzero(sizes > RANK) :]
         if not len(free):
             break
@@ -284,13 +284,17 @@ def _refuse_conflicts(
     inputs = [n for n in constraints.level.leaves if n in constraints.known]
     if not inputs:
         return
-    matrix = _matrix(_slopes(constraints, closed, inputs))
+    matrix = _matrix(_jacobian(constraints, closed, inputs))
     firm = constraints.firm
     rows = [*range(firm), *(firm + k for k in sorted(kept))]
     rest = np.linalg.norm(_beyond(matrix[firm:], matrix[rows]), axis=1)
     against = [e.name for k, e in enumerate(constraints.equations) if k not in kept and rest[k] > RANK]
     if against:
-        raise overdriven(flat, inputs, against)
+        raise StructureError(
+            f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
+            "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: leave "
+            "one drive out, or drive by a force"
+        )
 
 
 def _refuse_drives(
@@ -304,7 +308,7 @@ def _refuse_drives(
         closed = {**guess.values, **_close(free, loose, loose.values, flat.name)}
     except InitializationError:
         return
-    kept = _independent([_matrix(_slopes(constraints, closed))], constraints.firm)
+    kept = _independent([_matrix(_jacobian(constraints, closed))], constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gantrytau.border.refusal import InitializationError, ModelError, StructureError
+from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.dulmage_mendelsohn import decompose, signature
 from gantrytau.flattening.flat_model import FlatModel
@@ -174,41 +174,6 @@ def undetermined(
     )
 
 
-def without_inertia(flat: FlatModel, names: Sequence[str], equation: str) -> StructureError:
-    """Coordinates that nothing accelerates."""
-    words = ", ".join(f"{n} ({flat.hints[n]})" for n in names[:4])
-    return StructureError(
-        f"{flat.name}: {words} would have to follow from a balance of forces, {equation}, because this motion has "
-        "neither mass nor inertia. Expected a mass or an inertia for every motion: put a Body there, or hold the motion"
-    )
-
-
-def no_state(title: str, name: str, states: Sequence[str]) -> StructureError:
-    """A state that is asked for and cannot be one beside the others."""
-    return StructureError(
-        f"{title}: {name} cannot be a state together with the others asked for; the states of this model can be "
-        f"{', '.join(states)} ({len(states)} in all). Name other variables in states=, or fewer",
-        argument="states",
-    )
-
-
-def no_reinit(place: str, name: str, states: Sequence[str]) -> ModelError:
-    """A variable that an action gives a new value although it follows from others."""
-    shown = ", ".join(states[:8]) + (", ..." if len(states) > 8 else "")
-    return ModelError(
-        f"{place}: found reinit({name}, ...), but {name} is no state, as it follows from others; expected one of the "
-        f"states, {shown or 'of which there is none'}; what jumps with them follows by itself"
-    )
-
-
-def twice_reinit(place: str, name: str, other: str) -> ModelError:
-    """A state that actions of whens set by two of its names."""
-    return ModelError(
-        f"{place}: found reinit({name}, ...), but {name} is the same state as {other}, which a when sets as well; expected "
-        f"one name and one chain for it: set {other}, and join the whens by .elsewhen"
-    )
-
-
 def dependent(title: str, equations: Sequence[Equation], matrix: np.ndarray, least: float) -> StructureError:
     """Constraints whose Jacobian, a row each, has not their number as its rank; least: expected singular value."""
     left, values, _ = np.linalg.svd(matrix)
@@ -226,23 +191,6 @@ def held_together(title: str, names: Sequence[str], why: str) -> StructureError:
     return StructureError(
         f"{title}: {shown} hold their highest derivatives in the same combination, and {why}. Expected equations from which "
         "each of these follows: write one of them without these, or replace the one that repeats the others"
-    )
-
-
-def overdriven(flat: FlatModel, inputs: Sequence[str], against: Sequence[str]) -> StructureError:
-    """Constraints that hold only as long as the inputs happen to agree."""
-    return StructureError(
-        f"{flat.name}: more is driven than can move: with the inputs {', '.join(inputs)} given, {'; '.join(against)} "
-        "can only hold if they agree by chance. Expected as many driven joints as the mechanism has freedoms: "
-        "leave one drive out, or drive by a force"
-    )
-
-
-def differentiated(name: str, what: str, place: str) -> ModelError:
-    """What jumps at instants and is differentiated somewhere."""
-    return ModelError(
-        f"{name} is {what} and jumps at instants, but {place} has it differentiated; pass it through a filter "
-        "(gantrytau.mechanics.filters.LowPass), or let it drive a force instead of a motion"
     )
 
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.refusal import Given, StructureError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.compiler.refusals import dependent, no_state
+from gantrytau.compiler.refusals import dependent
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.language.declarations import StateSelect
@@ -67,7 +68,11 @@ def choose_states(
     )
     missing = [n for n in wanted if n not in states]
     if missing:
-        raise no_state(title, missing[0], states)
+        words = (
+            f"{missing[0]} cannot be a state together with the others asked for; the states of this model can be "
+            f"{', '.join(states)} ({len(states)} in all). Name other variables in "
+        )
+        raise StructureError(words, Given("states"), ", or fewer", place=title, argument="states")
     return StateChoice(states, tuple(sorted(dummies)), condition)
 
 

@@ -8,7 +8,7 @@ from typing import Literal
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.compiler.blocks.inverse_form import Inverse, SortedEquations, inverse_of, torn_of
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block
@@ -93,11 +93,11 @@ def assemble(
             left.enter(one)
     if causality == "inverse" and not left.inverse:
         why = f" ({'; '.join(left.forward)})" if left.forward else ""
-        raise ModelError(
-            f"{dae.name}: causality='inverse', but nothing has an inverse form here{why}, expected as many inputs that "
-            "drive a mechanism as it has accelerations of states; leave causality out",
-            argument="causality",
+        words = (
+            f"but nothing has an inverse form here{why}, expected as many inputs that drive a mechanism as it has "
+            "accelerations of states; leave it out"
         )
+        raise ModelError(words, place=dae.name, found=Given("causality", causality))
     algebraics = left.algebraics
     draft = System(
         dae=dae,
@@ -185,10 +185,8 @@ class _Left:
         solution: Sequence[ca.SX | None] = block.solution or [None] * len(block.tears)
         if self.form == "lifted" and block.root is not None:
             # no square root to differentiate at zero
-            w, radicand = block.root.root, block.root.radicand
-            self.algebraics.append(
-                Algebraic(w.name(), w, w**2 - radicand, ca.sqrt(ca.fmax(radicand, 0)), 0.0)
-            )
+            w, inside = block.root.root, block.root.radicand
+            self.algebraics.append(Algebraic(w.name(), w, w**2 - inside, ca.sqrt(ca.fmax(inside, 0)), 0.0))
             self.definitions.append((block.tears[0], block.root.value))
         elif block.solution is None or (self.form == "lifted" and torn_of(block)):
             rows = zip(block.tears, block.residuals, solution, strict=True)

@@ -15,7 +15,6 @@ from gantrytau.compiler.blocks.solution import solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, reduce_index
 from gantrytau.compiler.parameters import ParameterTable, parameter_table
 from gantrytau.compiler.redundancy import Settled, without_redundant
-from gantrytau.compiler.refusals import differentiated, no_reinit, twice_reinit
 from gantrytau.compiler.request import Request
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import start_values
@@ -72,21 +71,13 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
     known = tuple(n for n in scalars if n not in parameters)
     variables = {n for v in flat.variables for n in v.elements}
     for name in known:
-        if name.startswith("der("):
-            raise ModelError(
-                f"given: {name} is a derivative, expected variables; name the variable itself",
-                argument="given",
-            )
+        why = "is set at instants (by sampled, when or stick_slip); leave it out, it is known anyway"
         if name not in variables:
-            raise ModelError(
-                f"given: {name} is no variable, but follows from others; name those", argument="given"
-            )
-        if name in events:
-            raise ModelError(
-                f"given: {name} is set at instants (by sampled, when or stick_slip), expected another variable; leave it "
-                "out, it is known anyway",
-                argument="given",
-            )
+            derived = name.startswith("der(")
+            why = "is a derivative; name the variable" if derived else "follows from others; name those"
+        elif name not in events:
+            continue
+        raise ModelError(f"{name} {why}, expected variables", place="given", argument="given")
     table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
     return table, (*(known or flat.inputs), *events)
 
@@ -209,9 +200,18 @@ def _refuse_reinits(dae: Translated) -> frozenset[str]:
                 decisive = leaves.intersection(dae.table.independent)
                 if decisive and len(leaves - decisive) == 2 and not decisive & _loose(dae.flat, dae.request):
                     return frozenset(decisive)
-                raise no_reinit(one.label, name, dae.states)
-            if owners.setdefault(symbol, name) != name:
-                raise twice_reinit(one.label, name, owners[symbol])
+                shown = ", ".join(dae.states[:8]) + (", ..." if len(dae.states) > 8 else "")
+                raise ModelError(
+                    f"found reinit({name}, ...), but {name} is no state, as it follows from others; expected one of the "
+                    f"states, {shown or 'of which there is none'}; what jumps with them follows by itself",
+                    place=one.label,
+                )
+            if (other := owners.setdefault(symbol, name)) != name:
+                raise ModelError(
+                    f"found reinit({name}, ...), but {name} is the same state as {other}, which a when sets as well; "
+                    f"expected one name and one chain for it: set {other}, and join the whens by .elsewhen",
+                    place=one.label,
+                )
     return frozenset()
 
 
@@ -240,9 +240,7 @@ def _sampled_derivatives(flat: FlatModel) -> list[str]:
     if not (flat.sampled or flat.frictions or flat.whens or flat.delays):
         return []
     used = [s.expression for s in (*flat.sampled, *flat.delays)]
-    used += [
-        e for one in flat.whens for e in (one.condition, *(v for _, v in (*one.reinits, *one.assignments)))
-    ]
+    used += [e for w in flat.whens for e in (w.condition, *(v for _, v in (*w.reinits, *w.assignments)))]
     used += [e for f in flat.frictions for e in (f.coulomb, f.smooth, f.breakaway)]
     variables = {n for v in flat.variables for n in v.elements}
     there = {leaf.name() for e in flat.equations for leaf in ca.symvar(e.residual)}
@@ -267,4 +265,7 @@ def _refuse_differentiated(
             what = "friction that sticks" if any(f.force == name for f in flat.frictions) else "a Discrete"
             what = "delayed" if any(d.name == name for d in flat.delays) else what
             what = "sampled" if any(s.name == name for s in flat.sampled) else what
-            raise differentiated(name, what, place)
+            raise ModelError(
+                f"{name} is {what} and jumps at instants, but {place} has it differentiated; pass it through a filter "
+                "(gantrytau.mechanics.filters.LowPass), or let it drive a force instead of a motion"
+            )

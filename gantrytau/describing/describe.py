@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.describing.described import Description, Listing
 from gantrytau.describing.short_values import LENGTH, cut, short
 
@@ -22,10 +22,7 @@ def describe(thing: Any, name: str = "") -> Description:
     A class says it in a method `__describe__(name)`, and what is said of the class itself in `__describe_class__(name)`.
     """
     if not isinstance(name, str):
-        raise ModelError(
-            f"describe: found the name {short(name)}, expected text, as describe(robot, 'tool.r')",
-            argument="name",
-        )
+        raise ModelError("expected text, as 'tool.r'", place="describe", found=Given("name", name))
     if isinstance(thing, str):
         raise ModelError(
             f"describe: found the text {short(thing)}, expected a model, a class, a result; write describe(Revolute), or "
@@ -73,9 +70,8 @@ def class_described(cls: type, name: str = "") -> Description:
             return _function(getattr(cls, name), "") if callable(getattr(cls, name)) else _property(cls, name)
         if name in held:
             return Description(f"{cls.__name__}.{name}", "field", told_of(cls).get(name, ""))
-        raise ModelError(
-            f"describe: {cls.__name__} has no '{name}'{did_you_mean(name, [*held, *asked])}", argument="name"
-        )
+        words = f"{cls.__name__} has no '{name}'{did_you_mean(name, [*held, *asked])}"
+        raise ModelError(words, place="describe", argument="name")
     told = told_of(cls)
     rows = [(key, _annotation(f.type), told.get(key, "")) for key, f in held.items()]
     answers = [(key + _asked(value), first_sentence(_doc(value))) for key, value in asked.items()]
@@ -95,10 +91,8 @@ def object_described(thing: Any, name: str = "") -> Description:
     if name:
         if name not in names and not isinstance(getattr(cls, name, None), property):
             others = [n for n, value in inspect.getmembers_static(cls) if isinstance(value, property)]
-            raise ModelError(
-                f"describe: this {cls.__name__} has no '{name}'{did_you_mean(name, [*names, *_public(others)])}",
-                argument="name",
-            )
+            words = f"this {cls.__name__} has no '{name}'{did_you_mean(name, [*names, *_public(others)])}"
+            raise ModelError(words, place="describe", argument="name")
         found = describe(getattr(thing, name))
         words = told_of(cls).get(name, "") or first_sentence(_doc(getattr(cls, name, None)))
         return Description(name, f"of {cls.__name__}", words, (), found.tables, found.text)
@@ -142,9 +136,7 @@ def _public(names: Iterable[str]) -> list[str]:
 def _function(function: Any, name: str) -> Description:
     """A function: its arguments, and what its documentation says of them."""
     if name:
-        raise ModelError(
-            f"describe: found the name '{name}' and a function, expected none; leave it out", argument="name"
-        )
+        raise ModelError("a function has none; leave it out", place="describe", found=Given("name", name))
     try:
         arguments = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # of compiled functions

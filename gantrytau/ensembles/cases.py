@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.checks import instance, one_of, whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 
 SEED = "seed"  # the name of the axis of seeds
@@ -93,13 +94,8 @@ class Axes(Record):
 
 def read_axes(over: Any, seeds: Any, combine: Any) -> Axes:
     """The axes of a study; ModelError for what is no list of values, empty, or of several lengths with "zip"."""
-    if not isinstance(over, Mapping) and over is not None:
-        raise ModelError(f"study: found over={over!r}, expected {{name: values}}", argument="over")
-    if combine not in WAYS:
-        hint = did_you_mean(str(combine), WAYS)
-        raise ModelError(
-            f"study: found combine={combine!r}, expected 'grid' or 'zip'{hint}", argument="combine"
-        )
+    one_of("study", "combine", combine, WAYS)
+    instance("study", "over", over, (Mapping, type(None)), "{name: values}")
     lists = {str(name): _values(str(name), values) for name, values in (over or {}).items()}
     numbers = None if seeds is None else _seeds(seeds)
     if not lists and numbers is None:
@@ -136,19 +132,16 @@ def _values(name: str, values: Any) -> tuple[Any, ...]:
 
 
 def _seeds(seeds: Any) -> tuple[int, ...]:
-    whole = isinstance(seeds, (int, np.integer)) and not isinstance(seeds, bool)
-    if whole and seeds > 0:
-        return tuple(range(int(seeds)))
-    found = [] if whole or isinstance(seeds, (str, bytes, bool)) or not np.iterable(seeds) else list(seeds)
-    good = all(isinstance(s, (int, np.integer)) and not isinstance(s, bool) and s >= 0 for s in found)
-    if not found or not good:
+    if isinstance(seeds, (str, bytes)) or not np.iterable(seeds):
+        return tuple(range(whole("study", "seeds", seeds, least=1)))
+    found = tuple(whole("study", "seeds", seed, least=0) for seed in seeds)
+    if not found or len(set(found)) < len(found):
         raise ModelError(
-            f"study: found seeds={seeds!r}, expected how many, as 20, or a list of whole numbers from 0",
-            argument="seeds",
+            "expected how many, as 20, or a list of different numbers",
+            place="study",
+            found=Given("seeds", seeds),
         )
-    if len(set(found)) < len(found):
-        raise ModelError(f"study: found seeds={seeds!r}, expected each one once", argument="seeds")
-    return tuple(int(s) for s in found)
+    return found
 
 
 def equal(a: Any, b: Any) -> bool:

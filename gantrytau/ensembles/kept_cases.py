@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from gantrytau.border.checks import instance
 from gantrytau.border.refusal import ModelError
 from gantrytau.ensembles.workers.payloads import pack, unpack
 from gantrytau.ensembles.workers.worker import Outcome
@@ -26,10 +27,7 @@ class KeptCases:
     """
 
     def __init__(self, folder: str | os.PathLike[str], fingerprint: Mapping[str, str]):
-        if not isinstance(folder, (str, os.PathLike)):
-            raise ModelError(
-                f"study: found folder={folder!r}, expected the path of a folder", argument="folder"
-            )
+        instance("study", "folder", folder, (str, os.PathLike), "the path of a folder")
         self.folder = Path(folder)
         self.fingerprint = dict(fingerprint)
         if self.folder.exists() and not self.folder.is_dir():

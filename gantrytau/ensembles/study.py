@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, Unpack
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.translated import Translated
 from gantrytau.ensembles.cases import Axes, Case, read_axes
@@ -17,6 +18,7 @@ from gantrytau.ensembles.study_record import Study
 from gantrytau.ensembles.workers.places import Place, outcomes, read_place
 from gantrytau.language.model import Model
 from gantrytau.progress import Progress
+from gantrytau.simulation.simulate import checked_policy
 
 
 def study(
@@ -45,6 +47,8 @@ def study(
     The model is translated once. A case that fails is one of `.failures`; one that ends its process is tried again first.
     Raises ModelError for what is written wrongly, SolveError with `.result`, the cases that are finished, at Ctrl-C.
     """
+    checked_policy("study", policy)
+    stop = None if stop is None else number("study", "stop", stop, unit="s")
     axes = read_axes(over, seeds, combine)
     place = read_place(where)
     task: ModelTask | FunctionTask
@@ -89,7 +93,7 @@ def _finished(
             f"{title}: study interrupted, {len(found)} of {len(cases)} cases are finished, which .result holds{rest}",
             result=Study(title, axes, cases, found),
         ) from error
-    for number, outcome in sorted(found.items()):
+    for case, outcome in sorted(found.items()):
         for category, words in outcome.told:
-            warnings.warn(f"{cases[number]}: {words}", category, stacklevel=3)
+            warnings.warn(f"{cases[case]}: {words}", category, stacklevel=3)
     return Study(title, axes, cases, found)

@@ -7,6 +7,7 @@ a number is taken as an angle, and its sine as a number: `0.5 * sin(3 * time)` i
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -15,8 +16,7 @@ import casadi as ca
 from gantrytau.border.dimensions import ONE, Dimension, dimension, unit_text, whole
 from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel
-from gantrytau.flattening.instants import delay_equations, unit_equations
-from gantrytau.flattening.whens import when_units
+from gantrytau.flattening.instants import sides
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
@@ -31,28 +31,8 @@ SAME = {
 }  # fmt: skip
 RELATIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE}
 KEEP = {ca.OP_ASSIGN, ca.OP_NEG, ca.OP_TWICE, ca.OP_FABS, ca.OP_FLOOR, ca.OP_CEIL}
-ANGLES = {
-    getattr(ca, f"OP_{name.upper()}"): name
-    for name in [
-        "sin",
-        "cos",
-        "tan",
-        "asin",
-        "acos",
-        "atan",
-        "sinh",
-        "cosh",
-        "tanh",
-        "asinh",
-        "acosh",
-        "atanh",
-        "exp",
-        "log",
-        "log1p",
-        "expm1",
-        "erf",
-    ]
-}
+OF_NUMBERS = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log log1p expm1 erf"
+ANGLES = {getattr(ca, f"OP_{name.upper()}"): name for name in OF_NUMBERS.split()}
 POWERS: dict[int, int | Fraction] = {ca.OP_SQ: 2, ca.OP_SQRT: Fraction(1, 2), ca.OP_INV: -1}
 
 SIGNS = {ca.OP_ADD: " + ", ca.OP_SUB: " - ", ca.OP_MUL: "*", ca.OP_DIV: "/"}
@@ -74,8 +54,7 @@ class Dimensioned(NamedTuple):
 
 def check_units(flat: FlatModel) -> None:
     """ModelError naming equation, the two terms and their units, for the first that disagree."""
-    events = [*unit_equations(flat), *when_units(flat), *delay_equations(flat)]
-    check_equations(flat, flat.equations, flat.initial_equations, events, _attributes(flat))
+    check_equations(flat, flat.equations, flat.initial_equations, _events(flat), _attributes(flat))
 
 
 def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
@@ -98,6 +77,14 @@ def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
                     f"{equation.name}: units disagree in `{equation.text[:160]}`: the left side is in "
                     f"{_text(left)}, the right side in {_text(right)}; correct the equation or a declaration"
                 )
+
+
+def _events(flat: FlatModel) -> list[Equation]:
+    """Equations whose units agree if those of statements on instants do; a condition agrees with itself."""
+    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
+    symbols[flat.time.name()] = flat.time
+    found = sides((*flat.sampled, *flat.frictions, *flat.whens, *flat.delays))
+    return [replace(e, left=symbols.get(e.left.name(), e.right)) for e in found]
 
 
 def _attributes(flat: FlatModel) -> list[Equation]:
@@ -183,9 +170,8 @@ def _unit(
         fault = None
         if not _agree(first, second):
             fault = (
-                f"units disagree: `{words[0][:60]}` is in {_text(first)}, `{words[1][:60]}` in "
-                f"{_text(second)}; "
-                "both must be the same to be added or compared"
+                f"units disagree: `{words[0][:60]}` is in {_text(first)}, `{words[1][:60]}` in {_text(second)}; both must "
+                "be the same to be added or compared"
             )
         merged = next((u for u in units if not isinstance(u, str)), ANY if ANY in units else NUMBER)
         return (ONE if operation in RELATIONS else merged), fault
@@ -227,8 +213,6 @@ def _product(first: Unit, second: Unit, sign: int) -> Unit:
 def _times(first: Dimension, second: Dimension, power: int) -> Dimension:
     if second == ONE:
         return first
-    if power == 1:
-        return tuple(a + b for a, b in zip(first, second, strict=True))
     return tuple(a + power * b for a, b in zip(first, second, strict=True))
 
 

@@ -50,9 +50,7 @@ def connection_equations(
                 faces.append((path, -1 if owners[path] == where else 1))
             _check_same(pair, faces, where)
             if id(pair) in closing:
-                carried += [
-                    (face, sign, closing[id(pair)]) for face, sign in zip(faces, (1, -1), strict=True)
-                ]
+                carried += [(f, sign, closing[id(pair)]) for f, sign in zip(faces, (1, -1), strict=True)]
             else:
                 parent[find(faces[0])] = find(faces[1])
     into: dict[Face, list[tuple[int, Closure]]] = {}
@@ -82,9 +80,8 @@ def _path(instance: Instance, end: Any, where: str) -> str:
         return instance.path(end)
     except KeyError:
         raise ModelError(
-            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of "
-            "this model, "
-            "expected a connector reached through self"
+            f"{where or 'the model'}: connect() was given a {type(end).__name__} that is not part of this model, expected "
+            "a connector reached through self"
         ) from None
 
 
@@ -97,9 +94,8 @@ def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
         ]
         missing = sorted(a ^ b)[0]
         raise ModelError(
-            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: "
-            f"'{missing}' is in "
-            f"one of them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
+            f"{where or 'the model'}: connect({kinds[0]}, {kinds[1]}) joins different connectors: '{missing}' is in one of "
+            f"them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
         )
 
 
@@ -116,9 +112,7 @@ def _set_equations(
         for row in range(len(columns[0])):
             element = row if len(columns[0]) > 1 else None
             if declaration.kind == "flow":
-                total = sum(
-                    (sign * column[row] for sign, column in zip(signs, columns, strict=True)), ca.SX(0)
-                )
+                total = sum((s * column[row] for s, column in zip(signs, columns, strict=True)), ca.SX(0))
                 total += sum((sign * closure.flow(name, row) for sign, closure in closures), ca.SX(0))
                 equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
             elif declaration.kind != "propagated":

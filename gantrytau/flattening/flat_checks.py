@@ -1,7 +1,7 @@
 """What cannot be in a model that is written out: numbers that are none, coordinates that do not exist, what jumps."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 import casadi as ca
 
@@ -20,9 +20,8 @@ def refuse_nan(equations: Iterable[Equation]) -> None:
         for equation in equations:
             if re.search(r"\bnan\b", equation.text):
                 raise ModelError(
-                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and "
-                    "finite numbers; "
-                    "functions of the module math do not work on symbols, use those of gantrytau or casadi"
+                    f"{equation.name}: found nan in `{equation.text[:100]}`, expected symbols and finite numbers; functions "
+                    "of the module math do not work on symbols, use those of gantrytau or casadi"
                 )
 
 
@@ -83,49 +82,23 @@ def refuse_bound(discretes: Iterable[FlatVariable], equations: Iterable[Equation
             )
 
 
-def refuse_events(flat: FlatModel) -> None:
-    """ModelError naming the first component whose values or equations change at instants."""
-    refuse_sticking(flat)
-    refuse_whens(flat)
-    refuse_delays(flat)
-    _refuse_any(
-        [event.label for event in flat.sampled],
-        "found a value that jumps at instants, expected continuous equations. simulate, linearize and FMUs sample it; "
-        "optimisation and extraction cannot: leave it out there, or write it as a continuous equation. "
-        "translate(..., events=True) takes it as known",
-    )
+REFUSED = {  # statements on instants -> why they cannot be
+    "frictions": "found friction that sticks, whose equations change at instants, expected equations that stay. simulate "
+    "and FMUs let it stick; optimisation, linearisation and extraction cannot: take a smooth friction there, TanhFriction. "
+    "translate(..., events=True) takes its force as known",
+    "whens": "found a condition at which variables jump, expected continuous equations. simulate and FMUs act upon it; "
+    "optimisation, linearisation and extraction cannot: leave it out there, or write it as a continuous equation",
+    "delays": "found a value of the past, expected equations of one time. simulate and FMUs remember it; functions, linear "
+    "systems and optimisation cannot: leave it out there, or write a chain of first-order lags, T / n * der(y) == x - y, "
+    "n times; translate(..., events=True) takes it as known",
+    "sampled": "found a value that jumps at instants, expected continuous equations. simulate, linearize and FMUs sample "
+    "it; optimisation and extraction cannot: leave it out there, or write it as a continuous equation. "
+    "translate(..., events=True) takes it as known",
+}
 
 
-def refuse_delays(flat: FlatModel) -> None:
-    """ModelError naming the first delay of a model."""
-    _refuse_any(
-        [one.name for one in flat.delays],
-        "found a value of the past, expected equations of one time. simulate and FMUs remember it; functions, linear "
-        "systems and optimisation cannot: leave it out there, or write a chain of first-order lags, "
-        "T / n * der(y) == x - y, n times; translate(..., events=True) takes it as known",
-    )
-
-
-def refuse_whens(flat: FlatModel) -> None:
-    """ModelError naming the first when of a model."""
-    _refuse_any(
-        [event.label for event in flat.whens],
-        "found a condition at which variables jump, expected continuous equations. simulate and FMUs act upon it; "
-        "optimisation, linearisation and extraction cannot: leave it out there, or write it as a continuous equation",
-    )
-
-
-def refuse_sticking(flat: FlatModel) -> None:
-    """ModelError naming the first component whose friction sticks."""
-    _refuse_any(
-        [event.label for event in flat.frictions],
-        "found friction that sticks, whose equations change at instants, expected equations that stay. simulate and FMUs "
-        "let it stick; optimisation, linearisation and extraction cannot: take a smooth friction there, TanhFriction. "
-        "translate(..., events=True) takes its force as known",
-    )
-
-
-def _refuse_any(places: Sequence[str], words: str) -> None:
-    """ModelError at the first of some places, if there are any."""
-    if places:
-        raise ModelError(f"{places[0]}: {words}")
+def refuse_events(flat: FlatModel, *kinds: str) -> None:
+    """ModelError naming the first statement on instants, of some kinds of REFUSED or of all."""
+    for kind in kinds or REFUSED:
+        for one in getattr(flat, kind):
+            raise ModelError(REFUSED[kind], place=one.label)

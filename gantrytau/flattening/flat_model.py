@@ -12,7 +12,7 @@ from gantrytau.describing.record import Record
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.self_description.rods import Rods
-from gantrytau.language.statements import Equation, Requirement
+from gantrytau.language.statements import Equation, Requirement, place_of
 from gantrytau.language.symbols import Range, derivative_name, split_derivative
 
 
@@ -89,7 +89,12 @@ class Sampled:
     @property
     def label(self) -> str:
         """Where it is stated, and of what."""
-        return f"{self.path or 'the model'} ({self.model}), sampled({self.name})"
+        return f"{place_of(self.path, self.model)}, sampled({self.name})"
+
+    @property
+    def sides(self) -> tuple[tuple[str, ca.SX], ...]:
+        """Its expressions, each with the name of what it is a value of."""
+        return (self.name, self.expression), ("time", self.period)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +116,12 @@ class StickSlip:
     @property
     def label(self) -> str:
         """Where it is stated, and of what."""
-        return f"{self.path or 'the model'} ({self.model}), stick_slip({self.force})"
+        return f"{place_of(self.path, self.model)}, stick_slip({self.force})"
+
+    @property
+    def sides(self) -> tuple[tuple[str, ca.SX], ...]:
+        """Its expressions, all of them forces."""
+        return tuple((self.force, part) for part in (self.coulomb, self.smooth, self.breakaway))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +151,13 @@ class When:
     def label(self) -> str:
         """Where it is stated, and on what condition."""
         words = str(self.condition)
-        place = f"{self.path or 'the model'} ({self.model}), equation {self.number}"
-        if self.words:
-            return f"{place}, {self.words}"
-        return f"{place}, when({words if len(words) <= 60 else words[:57] + '...'})"
+        when = f"when({words if len(words) <= 60 else words[:57] + '...'})"
+        return f"{place_of(self.path, self.model, self.number)}, {self.words or when}"
+
+    @property
+    def sides(self) -> tuple[tuple[str, ca.SX], ...]:
+        """Its condition, which is a value of nothing, and the new values by name."""
+        return ("", self.condition), *self.reinits, *self.assignments
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +170,20 @@ class Delay:
     name: str
     expression: ca.SX
     time: ca.SX
+    path = model = ""
+
+    @property
+    def label(self) -> str:
+        """Its name, which says it."""
+        return self.name
+
+    @property
+    def sides(self) -> tuple[tuple[str, ca.SX], ...]:
+        """Its expressions, each with the name of what it is a value of."""
+        return (self.name, self.expression), ("time", self.time)
+
+
+OnInstants = Sampled | StickSlip | When | Delay
 
 
 @dataclass(frozen=True, eq=False)

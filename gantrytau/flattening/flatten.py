@@ -19,24 +19,17 @@ from gantrytau.flattening.flat_checks import (
 )
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip, When
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.instants import (
-    Events,
-    expressed,
-    read_delays,
-    read_events,
-    with_expressions,
-    with_starts,
-)
+from gantrytau.flattening.instants import Events, read_delays, read_events, sides, with_sides, with_starts
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
-from gantrytau.flattening.whens import read_whens, refuse_unassigned, when_sides, with_sides
+from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
 from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.self_description.appearance import Shape, shapes_of
 from gantrytau.language.self_description.rods import rods_of
-from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality
+from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality, place_of
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
 
 
@@ -105,9 +98,9 @@ def write_out(instance: Instance) -> FlatModel:
         equations += [e for closure in closures for e in closure.equations]
         spread = Spread(instance, tree)
         written, written_initial = spread.substituted(equations), spread.substituted(stated.initial)
-        events, sampled, frictions, whens, sides = _events(stated, instance, spread)
+        events, sampled, frictions, whens, right = _events(stated, instance, spread)
         refuse_before((*written, *written_initial))
-        everything = (*written, *written_initial, *sides)
+        everything = (*written, *written_initial, *right)
         refuse_tables(everything)
         refuse_nan(everything)
         spread.refuse_undefined(everything)
@@ -174,12 +167,13 @@ def _events(
 ) -> tuple[Events, tuple[Sampled, ...], tuple[StickSlip, ...], tuple[When, ...], tuple[Equation, ...]]:
     """What happens at instants: as it is read, the records of it, and their expressions as right sides of equations."""
     events = read_events(stated.events, instance.symbols)
-    written = spread.substituted(expressed(events, instance.symbols))
-    refuse_before(written)
-    sampled, frictions = with_expressions(events, written)
-    whens = read_whens(stated.whens, instance.symbols, {s.name for s in sampled})
-    of_whens = spread.substituted(when_sides(whens))
-    return events, sampled, frictions, with_sides(whens, of_whens), (*written, *of_whens)
+    held = spread.substituted(sides([*events.sampled, *events.frictions]))
+    refuse_before(held)
+    whens = read_whens(stated.whens, instance.symbols, {s.name for s in events.sampled})
+    written = (*held, *spread.substituted(sides(whens)))
+    rest = iter(written)
+    sampled, frictions = with_sides(events.sampled, rest), with_sides(events.frictions, rest)
+    return events, sampled, frictions, with_sides(whens, rest), written
 
 
 def _discretes(
@@ -225,10 +219,9 @@ def _is_parameter(placed: Placed) -> bool:
 def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str) -> Iterator[tuple[int, Any]]:
     """Numbered statements of a component; an error on the way is told with the place where it happened."""
     within, number, end = path or "the model", 0, object()
-    generator: Iterator[Any] = told(f"{within} ({model}), equation 1", lambda: iter(generate()), within)
+    generator: Iterator[Any] = told(place_of(path, model, 1), lambda: iter(generate()), within)
     while True:
-        place = f"{within} ({model}), equation {number + 1}"
-        statement = told(place, lambda: next(generator, end), within)
+        statement = told(place_of(path, model, number + 1), lambda: next(generator, end), within)
         if statement is end:
             return
         number += not isinstance(statement, Requirement)

@@ -59,12 +59,13 @@ class Placed:
 class Instance:
     """An instantiated model: the root whose members are symbols, and lists of all that is in it."""
 
-    root: Any
-    symbols: Symbols
-    quantities: list[Placed]
-    components: list[tuple[str, Any]]
-    connectors: list[tuple[str, Any, str]]  # path, connector, path of the component it belongs to
-    paths: dict[int, str]  # id of a component or connector -> its path
+    root: Any = None
+    symbols: Symbols = field(default_factory=Symbols)
+    quantities: list[Placed] = field(default_factory=list)
+    components: list[tuple[str, Any]] = field(default_factory=list)
+    # path, connector, path of the component it belongs to
+    connectors: list[tuple[str, Any, str]] = field(default_factory=list)
+    paths: dict[int, str] = field(default_factory=dict)  # id of a component or connector -> its path
 
     def path(self, member: Any) -> str:
         """The dotted path of a component or connector of this model."""
@@ -89,23 +90,18 @@ def instantiate(model: Model) -> Instance:
         model = _made(model)
     if not isinstance(model, Model):
         raise ModelError(f"found {type(model).__name__}, expected a Model (an instance, or its class)")
-    builder = _Builder(model.chosen_starts)
-    root = builder.build(model, "", {}, None, [])
-    builder.resolve_outers()
-    return Instance(
-        root, builder.symbols, builder.quantities, builder.components, builder.connectors, builder.paths
-    )
+    found = _Growing(chosen=model.chosen_starts)
+    found.root = found.build(model, "", {}, None, [])
+    found.resolve_outers()
+    return found
 
 
-class _Builder:
-    def __init__(self, chosen: frozenset[str]) -> None:
-        self.chosen = chosen
-        self.symbols = Symbols()
-        self.quantities: list[Placed] = []
-        self.components: list[tuple[str, Any]] = []
-        self.connectors: list[tuple[str, Any, str]] = []
-        self.paths: dict[int, str] = {}
-        self.outers: list[tuple[Any, str, Outer, list[Any]]] = []
+@dataclass(eq=False)
+class _Growing(Instance):
+    """An instance while it is built. chosen: starts that whoever uses the model said; outers: references to resolve."""
+
+    chosen: frozenset[str] = frozenset()
+    outers: list[tuple[Any, str, Outer, list[Any]]] = field(default_factory=list)
 
     def build(self, template: Declared, path: str, outer: Mapping[Any, Any], scope: Any, around: list[Any]):
         cls = type(template)
@@ -184,25 +180,20 @@ class _Builder:
                 f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
                 f"model; expected another name, as {full}_left"
             )
-        attributes = {
-            key: Leaf(getattr(declaration, key), instance)
-            for key in ATTRIBUTES
-            if getattr(declaration, key, None) is not None
-        }
+        declared = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
+        attributes = {key: Leaf(value, instance) for key, value in declared.items() if value is not None}
         if (
             isinstance(modification, Leaf)
             and isinstance(modification.value, Quantity)
             and not modification.value.name
         ):
             # an unnamed declaration replaces this one: mass=Free(9.0)
-            new = modification.value
-            said = {key: getattr(new, key, None) for key in ATTRIBUTES}
-            attributes |= {
-                key: Leaf(value, modification.scope)
-                for key, value in said.items()
-                if value is not None and not (isinstance(value, str) and value == "")
+            declaration = modification.value
+            said = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
+            stated = {
+                key: x for key, x in said.items() if x is not None and not (isinstance(x, str) and x == "")
             }
-            declaration = new
+            attributes |= _wrap(stated, modification.scope)
         elif modification is not None:
             changes = _attributes(modification, full)
             if isinstance(declaration, Parameter) and changes.keys() & {"start", "fixed"}:
@@ -239,8 +230,7 @@ class _Builder:
                     raise ModelError(
                         f"{self.paths[id(enclosing)] or type(enclosing).__name__}: found "
                         f"{' and '.join(self.paths[id(x)] for x in found)}, each a {kind}, of which "
-                        f"{self.paths[id(instance)]} cannot choose one; expected one {kind}; for other frames that do not "
-                        "move take Fixed"
+                        f"{self.paths[id(instance)]} cannot choose, expected one; other frames that do not move are Fixed"
                     )
                 if found and found[0] is not instance:
                     instance.__dict__[name] = found[0]
@@ -249,8 +239,7 @@ class _Builder:
                 place = self.paths[id(instance)] or type(instance).__name__
                 kind = wanted.component.__name__
                 raise ModelError(
-                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, "
-                    "expected one; "
+                    f"{place} ({type(instance).__name__}): found no {kind} in any model around it, expected one; "
                     f"declare `{kind.lower()} = {kind}()` in the body of {type(around[0]).__name__}"
                 )
 
@@ -285,8 +274,7 @@ def _attributes(modification: Any, path: str) -> dict[str, Leaf]:
     """The attributes that a modification of a variable or parameter sets."""
     if isinstance(modification, Leaf):
         if isinstance(modification.value, (Start, Bounds)):
-            found = modification.value.attributes()
-            return {key: Leaf(value, modification.scope) for key, value in found.items() if value is not None}
+            return _wrap_value(modification.value, modification.scope)
         if isinstance(modification.value, (Declared, Array)):
             raise ModelError(f"{path}: found a component as modification of a quantity, expected a value")
         return {"value": modification}
@@ -302,7 +290,7 @@ def _wrap(modifications: Mapping[str, Any], scope: Any) -> dict[Any, Any]:
 
 def _wrap_value(value: Any, scope: Any) -> Any:
     if isinstance(value, (Start, Bounds)):  # attributes, so that one does not erase the other
-        return {key: Leaf(x, scope) for key, x in value.attributes().items() if x is not None}
+        return _wrap(value.attributes(), scope)
     if isinstance(value, Mapping):
         return _wrap(value, scope)
     if isinstance(value, list) and any(isinstance(item, (Mapping, Declared)) for item in value):

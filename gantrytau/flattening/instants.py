@@ -1,18 +1,20 @@
 """What happens at instants, scalar by scalar: statements read into the records of the flat model, and their refusals."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeVar
 
 import casadi as ca
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.flattening.flat_model import Delay, FlatModel, FlatVariable, Sampled, StickSlip
+from gantrytau.flattening.flat_model import Delay, FlatVariable, OnInstants, Sampled, StickSlip
 from gantrytau.flattening.propagation import Spread
 from gantrytau.flattening.shapes import joined
 from gantrytau.language.events import Sampling, Sticking
-from gantrytau.language.statements import Equation, Requirement
+from gantrytau.language.statements import Equation, Requirement, place_of
 from gantrytau.language.symbols import Symbol, Symbols, scalars
+
+Statement = TypeVar("Statement", bound=OnInstants)
 
 
 @dataclass(eq=False)
@@ -30,7 +32,7 @@ def read_events(stated: Sequence[tuple[str, str, int, Sampling | Sticking]], sym
     """The records of statements (path, class, number, statement). ModelError for what cannot be one."""
     events = Events()
     for path, model, number, statement in stated:
-        place = f"{path or 'the model'} ({model}), equation {number}"
+        place = place_of(path, model, number)
         if isinstance(statement, Sampling):
             _read_sampling(events, statement, symbols, (path, model, place))
         else:
@@ -141,34 +143,25 @@ def _of_parameters(
     return whole * (shape[0] * shape[1] // len(whole))
 
 
-def expressed(events: Events, symbols: Symbols) -> list[Equation]:
-    """The expressions of the events as right sides of equations, for checks and substitutions."""
-    names = [*(s.name for s in events.sampled), *(f.force for f in events.frictions)]
-    return _right_sides(events.sampled, events.frictions, {n: symbols.by_name[n].sx for n in names})
-
-
-def _right_sides(
-    sampled: Sequence[Sampled], frictions: Sequence[StickSlip], symbols: Mapping[str, ca.SX]
-) -> list[Equation]:
-    found = [Equation(symbols[s.name], s.expression, s.path, s.model, 0, label=s.label) for s in sampled]
-    for f in frictions:
-        parts = (f.coulomb, f.smooth, f.breakaway)
-        found += [Equation(symbols[f.force], part, f.path, f.model, 0, label=f.label) for part in parts]
+def sides(statements: Sequence[OnInstants]) -> list[Equation]:
+    """The expressions of statements on instants as right sides of equations, for checks and substitutions."""
+    found = []
+    for one in statements:
+        for name, value in one.sides:
+            label = one.label + (", its time" if name == "time" else "")
+            found.append(Equation(ca.SX.sym(name), value, one.path, one.model, 0, label=label))
     return found
 
 
-def with_expressions(
-    events: Events, written: Sequence[Equation]
-) -> tuple[tuple[Sampled, ...], tuple[StickSlip, ...]]:
-    """The records with the right sides of `expressed` as they were substituted."""
-    count = len(events.sampled)
-    held = [replace(s, expression=e.right) for s, e in zip(events.sampled, written[:count], strict=True)]
-    rest = [e.right for e in written[count:]]
-    frictions = [
-        replace(f, coulomb=rest[3 * k], smooth=rest[3 * k + 1], breakaway=rest[3 * k + 2])
-        for k, f in enumerate(events.frictions)
-    ]
-    return tuple(held), tuple(frictions)
+def with_sides(statements: Sequence[Statement], written: Iterator[Equation]) -> tuple[Statement, ...]:
+    """The statements with the next right sides of `sides` as they were substituted."""
+
+    def new(value: Any) -> Any:
+        if isinstance(value, ca.SX):
+            return next(written).right
+        return tuple((n, next(written).right) for n, _ in value) if isinstance(value, tuple) else value
+
+    return tuple(replace(x, **{f.name: new(getattr(x, f.name)) for f in fields(x)}) for x in statements)
 
 
 def with_starts(variables: Sequence[FlatVariable], events: Events) -> tuple[FlatVariable, ...]:
@@ -184,15 +177,6 @@ def with_starts(variables: Sequence[FlatVariable], events: Events) -> tuple[Flat
         starts = tuple(events.starts.get(n, ca.SX(0)) for n in variable.elements)
         found.append(replace(variable, start=starts) if given else variable)
     return tuple(found)
-
-
-def unit_equations(flat: FlatModel) -> list[Equation]:
-    """Equations whose units agree if those of what is sampled and of frictions do."""
-    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
-    periods = [
-        Equation(s.period, flat.time, s.path, s.model, 0, label=f"{s.label}, period") for s in flat.sampled
-    ]
-    return _right_sides(flat.sampled, flat.frictions, symbols) + periods
 
 
 def read_delays(
@@ -212,9 +196,8 @@ def read_delays(
         if not one.time.is_constant():
             words = f"expected a time above zero, in s, in {one.name}"
             requirements.append(Requirement(one.time > 0, words))
-    whole = [Equation(one.symbol, one.expression, "", "", 0, label=one.name) for one in stated]
-    written = spread.substituted(whole)
-    delays = tuple(Delay(one.name, e.right, one.time) for one, e in zip(stated, written, strict=True))
+    bare = [Delay(one.name, one.expression, one.time) for one in stated]
+    delays = with_sides(bare, iter(spread.substituted(sides(bare))))
     units = {name: v.unit for v in variables for name in v.elements}
     described = {name: v.description for v in variables for name in v.elements}
     found = [
@@ -230,10 +213,3 @@ def read_delays(
         for one in stated
     ]
     return delays, tuple(found), requirements
-
-
-def delay_equations(flat: FlatModel) -> list[Equation]:
-    """Equations whose units agree if those of the delays do."""
-    symbols = {v.name: v.symbol for v in flat.variables}
-    found = [Equation(symbols[d.name], d.expression, "", "", 0, label=d.name) for d in flat.delays]
-    return found + [Equation(d.time, flat.time, "", "", 0, label=f"{d.name}, time") for d in flat.delays]

@@ -16,10 +16,11 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.flattening.instantiation import Instance, Leaf, Placed
-from gantrytau.flattening.whens import condition_of, place_of
+from gantrytau.flattening.whens import condition_of
 from gantrytau.language.declarations import Discrete, Quantity, Real
 from gantrytau.language.events import CurrentMode, Happening, Mode, Sampling, Transition, WhenChain
 from gantrytau.language.functions import if_else, logic_and
+from gantrytau.language.statements import place_of
 from gantrytau.language.symbols import element_names
 
 Where = tuple[str, str, int]  # path, class and number of a statement
@@ -87,11 +88,6 @@ def _read(said: Transition, where: Where, modes: dict[str, Placed], instance: In
         raise ModelError(
             f"{place}: found a transition of {said.mode.path} from {said.source} to itself, expected two modes; what "
             f"happens within one is when(logic_and(self.mode.is_in('{said.source}'), ...), ...)"
-        )
-    number = isinstance(said.priority, (int, float)) and not isinstance(said.priority, bool)
-    if said.priority is not None and not (number and np.isfinite(said.priority)):
-        raise ModelError(
-            f"{place}: found priority={said.priority!r}, expected a number; the lowest acts first"
         )
     guard = condition_of(said.guard, instance.symbols, (), place)
     return _Arrow(said, where, guard, guard)

@@ -18,7 +18,7 @@ from gantrytau.flattening.flat_model import FlatModel, When
 from gantrytau.flattening.instants import declared, sized
 from gantrytau.language.events import Happening, Reinit, Terminate, WhenChain
 from gantrytau.language.functions import plain_condition
-from gantrytau.language.statements import Equation, equality
+from gantrytau.language.statements import equality, place_of
 from gantrytau.language.symbols import Symbols, scalars
 
 RELATIONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
@@ -38,11 +38,6 @@ def read_whens(
             after = len(found) - 1
     _refuse_set_twice(found)
     return tuple(found)
-
-
-def place_of(path: str, model: str, number: int) -> str:
-    """Where a statement stands, in words."""
-    return f"{path or 'the model'} ({model}), equation {number}"
 
 
 def _read(branch: Happening, symbols: Symbols, held: Collection[str], where: Where, after: int) -> When:
@@ -209,43 +204,6 @@ def _refuse_set_twice(whens: Sequence[When]) -> None:
                     f"{one.label}: found {name}, which {owner.label} sets as well, expected one when for it, as both could "
                     "act at one instant; join them, when(first, ...).elsewhen(second, ...)"
                 )
-
-
-def when_sides(whens: Sequence[When]) -> list[Equation]:
-    """The expressions of whens as right sides of equations, for checks and substitutions."""
-    found = []
-    for one in whens:
-        condition = Equation(
-            ca.SX.sym("when"), one.condition, one.path, one.model, one.number, label=one.label
-        )
-        found.append(condition)
-        for name, value in (*one.reinits, *one.assignments):
-            found.append(replace(condition, left=ca.SX.sym(name), right=value))
-    return found
-
-
-def with_sides(whens: Sequence[When], written: Sequence[Equation]) -> tuple[When, ...]:
-    """The records with the right sides of `when_sides` as they were substituted."""
-    rest = iter(e.right for e in written)
-    return tuple(
-        replace(
-            one,
-            condition=next(rest),
-            reinits=tuple((n, next(rest)) for n, _ in one.reinits),
-            assignments=tuple((n, next(rest)) for n, _ in one.assignments),
-        )
-        for one in whens
-    )
-
-
-def when_units(flat: FlatModel) -> list[Equation]:
-    """Equations whose units agree if those of the whens do."""
-    symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
-    found = []
-    for equation in when_sides(flat.whens):
-        name = equation.left.name()
-        found.append(replace(equation, left=symbols.get(name, equation.right)))
-    return found
 
 
 def refuse_unassigned(discretes: Sequence[str], whens: Sequence[When]) -> None:

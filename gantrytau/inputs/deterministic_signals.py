@@ -2,23 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
-from gantrytau.inputs.input_signal import (
-    HeldSignal,
-    SmoothSignal,
-    check_positive,
-    check_seed,
-    check_span,
-    seed_of,
-)
+from gantrytau.border.checks import array, number, one_of
+from gantrytau.border.refusal import Given, ModelError
+from gantrytau.inputs.input_signal import HeldSignal, SmoothSignal, check_seed, check_span, seed_of
 from gantrytau.inputs.samples import Samples
 from gantrytau.language.functions import cos, exp, fmax, fmin, sin
 
+Kind = Literal["linear", "logarithmic"]
 PHASES = ("schroeder", "random")
 
 
@@ -60,13 +55,12 @@ class Chirp(SmoothSignal):
     high: float
     duration: float
     amplitude: float = 1.0
-    kind: Literal["linear", "logarithmic"] = "linear"
+    kind: Kind = "linear"
 
     def __post_init__(self):
-        for name, unit in (("low", "Hz"), ("high", "Hz"), ("duration", "s"), ("amplitude", "")):
-            check_positive("chirp", name, getattr(self, name), unit)
-        if self.kind not in ("linear", "logarithmic"):
-            raise ModelError(f"chirp: found kind={self.kind!r}, expected 'linear' or 'logarithmic'")
+        for name, unit in (("low", "Hz"), ("high", "Hz"), ("duration", "s"), ("amplitude", None)):
+            object.__setattr__(self, name, number("chirp", name, getattr(self, name), unit=unit, above=0.0))
+        one_of("chirp", "kind", self.kind, get_args(Kind))
 
     def __repr__(self) -> str:
         return (
@@ -91,13 +85,7 @@ class Chirp(SmoothSignal):
         return self.amplitude * sin(2 * np.pi * turns)
 
 
-def chirp(
-    low: float,
-    high: float,
-    duration: float,
-    amplitude: float = 1.0,
-    kind: Literal["linear", "logarithmic"] = "linear",
-) -> Chirp:
+def chirp(low: float, high: float, duration: float, amplitude: float = 1.0, kind: Kind = "linear") -> Chirp:
     """A sine whose frequency goes from `low` at t = 0 to `high` at `duration`, Hz and s; it begins at zero, rising.
 
     kind: the frequency is linear in time, or its logarithm is. Behind `duration` it goes on with `high`, its value and
@@ -166,38 +154,26 @@ def multisine(
     It is a function of time, which can be differentiated; over a common period of the frequencies nothing leaks.
     Raises ModelError for numbers that are not above zero, frequencies that stand twice, and shapes that do not fit.
     """
-    hertz = _positive("frequencies", frequencies)
-    sizes = _positive("amplitude", amplitude)
+    check_seed("multisine", seed)
+    given = {"frequencies": frequencies, "amplitude": amplitude}
+    hertz, sizes = (
+        np.atleast_1d(array("multisine", name, found, (), (None,), above=0.0))
+        for name, found in given.items()
+    )
     if sizes.size == 1:
         sizes = np.repeat(sizes, hertz.size)
     if sizes.shape != hertz.shape:
         raise ModelError(
             f"multisine: found {sizes.size} amplitudes, expected one, or {hertz.size} as of the frequencies"
         )
-    if len(set(hertz.tolist())) < hertz.size:
-        raise ModelError("multisine: found a frequency twice, expected different ones; add their amplitudes")
-    check_seed("multisine", seed)
+    if not hertz.size or len(set(hertz.tolist())) < hertz.size:
+        raise ModelError(
+            "expected one or several different ones; add the amplitudes of those that stand twice",
+            place="multisine",
+            found=Given("frequencies", frequencies),
+        )
     if isinstance(phases, str):
-        if phases not in PHASES:
-            raise ModelError(
-                f"multisine: found phases={phases!r}, expected 'schroeder', 'random' or an angle for each sine"
-            )
-        angles: Any = phases
+        angles: Any = one_of("multisine", "phases", phases, PHASES)
     else:
-        found = np.asarray(phases, dtype=float)
-        if found.shape != hertz.shape or not np.all(np.isfinite(found)):
-            raise ModelError(
-                f"multisine: found phases of shape {found.shape}, expected {hertz.size} finite angles in rad"
-            )
-        angles = tuple(found.tolist())
+        angles = tuple(array("multisine", "phases", phases, hertz.shape, unit="rad").tolist())
     return Multisine(tuple(hertz.tolist()), tuple(sizes.tolist()), angles, seed)
-
-
-def _positive(name: str, values: ArrayLike) -> np.ndarray:
-    try:
-        found = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        found = np.array([np.nan])
-    if found.ndim != 1 or not found.size or not np.all(np.isfinite(found)) or np.any(found <= 0):
-        raise ModelError(f"multisine: found {name}={values!r}, expected numbers above zero")
-    return found

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import array, instance, whole
 from gantrytau.border.refusal import ModelError, told
 from gantrytau.inputs.samples import SAME, Samples
 
@@ -82,10 +83,7 @@ class SmoothSignal(InputSignal):
 
 
 def _times(t: ArrayLike) -> np.ndarray:
-    times = np.asarray(t, dtype=float)
-    if not np.all(np.isfinite(times)) or np.any(times < 0):
-        raise ModelError(f"found the times {t!r}, expected finite times from 0 on, in s")
-    return times
+    return array("values", "t", t, unit="s", least=0.0)
 
 
 def counted(what: str, count: float) -> int:
@@ -111,22 +109,10 @@ def check_span(what: str, start: float, stop: float) -> None:
         )
 
 
-def check_positive(what: str, name: str, value: Any, unit: str) -> None:
-    """ModelError unless a value is one finite number above zero."""
-    good = isinstance(value, (int, float, np.number)) and not isinstance(value, bool) and 0 < value < np.inf
-    if not good:
-        raise ModelError(
-            f"{what}: found {name}={value!r}, expected a number above zero{unit and f', in {unit}'}"
-        )
-
-
 def check_seed(what: str, seed: Any) -> None:
     """ModelError unless a seed is None or a whole number that is not negative."""
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
-        raise ModelError(
-            f"{what}: found seed={seed!r}, expected a whole number from 0 on",
-            argument="seed",
-        )
+    if seed is not None:
+        whole(what, "seed", seed, least=0)
 
 
 def seed_of(what: str, seed: int | None, name: str) -> int:
@@ -172,10 +158,6 @@ def with_seeds(inputs: Any, seed: int | None) -> dict[str, Any]:
 
     Raises ModelError for what is no mapping, and for a seed that is none, or missing.
     """
-    if not isinstance(inputs, Mapping):
-        raise ModelError(
-            f"inputs: found {inputs!r}, expected {{name: number, function of time, samples or signal}}",
-            argument="inputs",
-        )
-    check_seed("inputs", seed)
+    instance("simulate", "inputs", inputs, Mapping, "{name: number, function of time, samples or signal}")
+    check_seed("simulate", seed)
     return {n: v.seeded(seed, n) if isinstance(v, InputSignal) else v for n, v in inputs.items()}

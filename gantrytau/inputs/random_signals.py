@@ -6,15 +6,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from gantrytau.border.checks import array, number, whole
 from gantrytau.border.refusal import ModelError
-from gantrytau.inputs.input_signal import (
-    HeldSignal,
-    check_positive,
-    check_seed,
-    counted,
-    rows_from,
-    seed_of,
-)
+from gantrytau.inputs.input_signal import HeldSignal, check_seed, counted, rows_from, seed_of
 from gantrytau.inputs.samples import Samples
 
 # a_n = sum of a_(n - lag), modulo 2: lags of primitive polynomials, so that all 2^bits - 1 states but zero follow one
@@ -37,16 +31,10 @@ class WhiteNoise(HeldSignal):
     seed: int | None = None
 
     def __post_init__(self):
-        check_positive("white_noise", "period", self.period, "s")
         check_seed("white_noise", self.seed)
-        try:
-            std = np.asarray(self.std, dtype=float)
-        except (TypeError, ValueError):
-            std = np.array(np.nan)
-        if std.ndim > 2 or not std.size or not np.all(np.isfinite(std)) or np.any(std < 0):
-            raise ModelError(
-                f"white_noise: found std={self.std!r}, expected a number that is not negative, or an array of them"
-            )
+        period = number("white_noise", "period", self.period, unit="s", above=0.0)
+        std = array("white_noise", "std", self.std, (), (None,), (None, None), least=0.0)
+        object.__setattr__(self, "period", period)
         object.__setattr__(self, "std", _as_tuples(std))
 
     def __repr__(self) -> str:
@@ -93,14 +81,10 @@ class BinarySequence(HeldSignal):
     seed: int | None = None
 
     def __post_init__(self):
-        if isinstance(self.bits, bool) or self.bits not in LAGS:
-            raise ModelError(
-                f"prbs: found bits={self.bits!r}, expected a whole number from {min(LAGS)} to {max(LAGS)}, of a period of "
-                "2^bits - 1 values"
-            )
-        check_positive("prbs", "hold", self.hold, "s")
-        check_positive("prbs", "amplitude", self.amplitude, "")
         check_seed("prbs", self.seed)
+        for name, unit in (("hold", "s"), ("amplitude", None)):
+            object.__setattr__(self, name, number("prbs", name, getattr(self, name), unit=unit, above=0.0))
+        whole("prbs", "bits", self.bits, least=min(LAGS), most=max(LAGS))
 
     def __repr__(self) -> str:
         return f"prbs(bits={self.bits}, hold={self.hold:g}, amplitude={self.amplitude:g}, seed={self.seed})"

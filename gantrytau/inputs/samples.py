@@ -2,16 +2,19 @@
 
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from gantrytau.border.checks import array, number, one_of
 from gantrytau.border.refusal import ModelError
 from gantrytau.border.units import known_scale, scale
 from gantrytau.flattening.shapes import fits
 
 LARGEST_GAP = 10.0  # median distances of samples: what is longer is a gap, across which nothing is known
 SMALL = 1e-9  # of a run, by which samples may fail to cover it: ends of times are sums
+Kind = Literal["linear", "constant"]
+KINDS = get_args(Kind)
 SAME = 8  # roundings of a time, within which two times are one: 3 * 0.1 is not 0.3
 
 
@@ -31,14 +34,17 @@ class Samples:
     times: Any
     values: Any
     _: KW_ONLY
-    kind: Literal["linear", "constant"] = "linear"
+    kind: Kind = "linear"
     deviation: Any = None
     largest_gap: float | None = None
     unit: str | None = None
     shape: tuple[int, ...] = field(init=False)
 
     def __post_init__(self):
-        times, values = _numbers("times", self.times), _numbers("values", self.values)
+        one_of("Samples", "kind", self.kind, KINDS)
+        if self.largest_gap is not None and self.largest_gap != np.inf:
+            number("Samples", "largest_gap", self.largest_gap, above=0.0)
+        times, values = (array("Samples", n, getattr(self, n), finite=False) for n in ("times", "values"))
         if values.ndim == 1:
             values = values[:, None]
         if self.unit is not None:
@@ -48,13 +54,11 @@ class Samples:
                 f"Samples: found times of shape {np.shape(self.times)} and values of shape {np.shape(self.values)}, "
                 "expected (n,) and (n,), (n, k) or (n, rows, columns)"
             )
-        if self.kind not in ("linear", "constant"):
-            raise ModelError(f"Samples: found kind={self.kind!r}, expected 'linear' or 'constant'")
         object.__setattr__(self, "shape", values.shape[1:])
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "values", self._as_columns(values))
-        for array in (self.times, self.values):
-            array.flags.writeable = False
+        for one in (self.times, self.values):
+            one.flags.writeable = False
         self._check()
         _ = self.deviations  # so that a wrong one is told at once
 
@@ -80,7 +84,8 @@ class Samples:
             raise ModelError(f"Samples: {error}", argument="unit") from None
         object.__setattr__(self, "unit", written.coherent)
         if self.deviation is not None:
-            object.__setattr__(self, "deviation", _numbers("deviation", self.deviation) * written.slope)
+            deviation = array("Samples", "deviation", self.deviation) * written.slope
+            object.__setattr__(self, "deviation", deviation)
         return values
 
     def check_unit(self, place: str, unit: str | None) -> None:
@@ -114,17 +119,14 @@ class Samples:
             )
 
     def _deviations(self, deviation: Any) -> np.ndarray:
-        found = _numbers("deviation", deviation)
+        found = array("Samples", "deviation", deviation, above=0.0)
         try:
-            whole = self._as_columns(np.broadcast_to(found, (self.times.size, *self.shape)).copy())
+            return self._as_columns(np.broadcast_to(found, (self.times.size, *self.shape)).copy())
         except ValueError:
             raise ModelError(
                 f"Samples: found deviation of shape {found.shape}, expected a number, (k,) or the shape of the values "
                 f"{self.values.shape}"
             ) from None
-        if not np.all(np.isfinite(whole)) or np.any(whole <= 0):
-            raise ModelError("Samples: found a deviation that is not above 0, expected standard deviations")
-        return whole
 
     def check_shape(self, place: str, shape: tuple[int, ...]) -> None:
         """ModelError unless each sample has the shape of what it is compared with."""
@@ -186,10 +188,3 @@ class Samples:
     def kinks(self) -> np.ndarray:
         """Times in s at which the course is not smooth."""
         return self.times[1:-1] if self.kind == "linear" else self.times[1:]
-
-
-def _numbers(what: str, values: Any) -> np.ndarray:
-    try:
-        return np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(f"Samples: found {what} {values!r}, expected numbers") from None

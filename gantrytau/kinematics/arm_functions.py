@@ -18,9 +18,8 @@ from gantrytau.answers.many_points.grown_branch import GrownBranch
 from gantrytau.border.refusal import ModelError
 from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, independent, limits_of, twists
 
-NEIGHBOURS = (
-    12  # places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
-)
+# places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
+NEIGHBOURS = 12
 ROUNDS = (32, 64, 128, 256, 512)  # places by which the branch is grown
 
 
@@ -62,7 +61,7 @@ class ArmFunctions(ModelFunctions):
 
     def rates(self, r, R: Any = None):
         """Velocity and angular velocity of the tool by rates of the joints, (N, 6, n)."""
-        return twists(self._forward.slopes(*self.ik(r, R)[0].T), R)
+        return twists(self._forward.jacobian(*self.ik(r, R)[0].T), R)
 
     def variables(self, names, r, R=None):
         """Values of other variables in poses, (N, k) each."""
@@ -88,7 +87,7 @@ class ArmFunctions(ModelFunctions):
     def _minors(self, q: np.ndarray) -> np.ndarray:
         """Determinants of the rows of the Jacobian that are independent at the start, (N,)."""
         rows = independent(self._home_rates)
-        return np.linalg.det(twists(self._forward.slopes(*q.T), self.fk(q)[1])[:, rows])
+        return np.linalg.det(twists(self._forward.jacobian(*q.T), self.fk(q)[1])[:, rows])
 
     @cached_property
     def _roots(self) -> dict[int, np.ndarray]:
@@ -113,7 +112,7 @@ class ArmFunctions(ModelFunctions):
 
     @property
     def _home_rates(self) -> np.ndarray:
-        return twists(self._forward.slopes(*self.home.q[:, None]), self.home.R[None])[0]
+        return twists(self._forward.jacobian(*self.home.q[:, None]), self.home.R[None])[0]
 
     @cached_property
     def _branch(self) -> FollowedBranch:

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, real, shown, vectors
+from gantrytau.kinematics.poses import mounting_axes, poses, vectors
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
-from gantrytau.kinematics.rods.rod_robots import RodRobot
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau.language.model import Model
 
@@ -54,12 +54,7 @@ class CartJoints(Record):
 
     def left(self, limit: float) -> np.ndarray:
         """What each ball joint has left of its largest angle in rad, (N, m, 2); negative beyond it."""
-        if not 0 < real(limit) <= math.pi:
-            raise ModelError(
-                f"CartJoints.left: found a limit of {limit!r}, expected an angle above 0 and up to pi in rad; convert "
-                "degrees with math.radians"
-            )
-        return real(limit) - self.ball
+        return number("CartJoints.left", "limit", limit, unit="rad", above=0.0, most=math.pi) - self.ball
 
     def inside(self, limit: float) -> np.ndarray:
         """Whether all ball joints of a pose keep that largest angle, (N,); False where there is no pose."""
@@ -94,12 +89,13 @@ def cart_joints(
     rows, one = vectors(q, len(kinematics.joints), "q", "cart_joints")
     place, turn = _pose(kinematics, rows, r, R)
     chain = tuple(_chain(geometry, arm, rows) for arm in geometry.arms)
-    carriers = np.stack([chain[arm][:, -1, :3, :3] for arm in geometry.arm], axis=1)  # (N, m, 3, 3)
     A, B = geometry.cart_joints(rows), geometry.plate_joints(place, turn)
-    along = [_on_both_ends(B - A, carriers, turn), _at_home(linked)]
+    home = linked.home
+    at_home = geometry.link_directions(home.q[None], home.r[None], home.R[None])
+    along = [geometry.link_directions(rows, place, turn), [axes[0] for axes in at_home]]
     ends = [
-        _of_joint(u, _axes(name, given, home))
-        for name, given, u, home in zip(
+        _of_joint(u, _axes(name, given, usual))
+        for name, given, u, usual in zip(
             ("cart_axes", "plate_axes"), (cart_axes, plate_axes), *along, strict=True
         )
     ]
@@ -145,29 +141,9 @@ def _chain(geometry: RodGeometry, arm: int, q: np.ndarray) -> np.ndarray:
     return found
 
 
-def _on_both_ends(gaps: np.ndarray, carriers: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vectors (N, m, 3) from cart to plate in the axes of what carries links, and in plate axes."""
-    return np.einsum("nmj,nmjk->nmk", gaps, carriers), gaps @ R
-
-
-def _at_home(linked: RodRobot) -> tuple[np.ndarray, np.ndarray]:
-    """The same in the home pose, (m, 3) each: the axes along which joints are mounted."""
-    home, geometry = linked.home, linked.geometry
-    q, r, R = home.q[None], home.r[None], home.R[None]
-    carriers = np.stack([geometry.carriers(arm, q)[-1][1] for arm in geometry.arm], axis=1)
-    on_cart, on_plate = _on_both_ends(geometry.plate_joints(r, R) - geometry.cart_joints(q), carriers, R)
-    return on_cart[0], on_plate[0]
-
-
 def _axes(name: str, given: Any, home: np.ndarray) -> np.ndarray:
     """Mounting axes of joints as unit vectors, (m, 3)."""
-    axes = home if given is None else floats(given)
-    if axes.shape not in ((3,), home.shape) or not (np.linalg.norm(axes, axis=-1) > 0).all():
-        raise ModelError(
-            f"cart_joints: found {name} {shown(given)}, expected one direction (3,) or one per link {home.shape}, none "
-            "of them zero; give one axis for each link",
-            argument=name,
-        )
+    axes = home if given is None else mounting_axes("cart_joints", name, given, (3,), home.shape)
     return np.broadcast_to(axes / np.linalg.norm(axes, axis=-1, keepdims=True), home.shape)
 
 

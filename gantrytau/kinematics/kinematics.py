@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 
 from gantrytau.answers.many_points.elimination import solved
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.compiler.parameters import parameter_table, with_values
 from gantrytau.dae import Dae, translate
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.arm_functions import ArmFunctions
 from gantrytau.kinematics.model_functions import ModelFunctions, home_of, limits_of
-from gantrytau.kinematics.poses import answered, floats, poses, real, vectors
+from gantrytau.kinematics.poses import answered, mounting_axes, poses, vectors
 from gantrytau.kinematics.rods.configurations import Configuration, of_joints, of_pose, of_signs
 from gantrytau.kinematics.rods.rod_geometry import geometry_of
 from gantrytau.kinematics.rods.rod_robots import Home, RodRobot, SixRods, TurningRods, robot_on
@@ -51,9 +52,9 @@ class Kinematics(Record):
         joints: Sequence[str] | None = None,
         tolerance: float = 1e-6,
     ):
+        self._tolerance = number("Kinematics", "tolerance", tolerance, unit="m", least=0.0)
         self.dae = robot if isinstance(robot, Dae) else translate(robot, units=False)
         self._tool = tool
-        self._tolerance = _length(tolerance)
         joints = None if joints is None else (joints,) if isinstance(joints, str) else tuple(joints)
         self._values = dict(self.dae.parameter_values)
         if f"{tool}.r" not in self.dae.vectors:
@@ -232,18 +233,14 @@ class Kinematics(Record):
         """
         robot = self.linked("ball_joint_angles")
         at, q, R = self._whole(robot, r, R, q, "Kinematics.ball_joint_angles")
-        default = _directions(robot, robot.home.q[None], robot.home.r[None], robot.home.R[None])
+        default = robot.geometry.link_directions(robot.home.q[None], robot.home.r[None], robot.home.R[None])
+        shape, place = (len(robot.geometry.length), 3), "Kinematics.ball_joint_angles"
+        given = {"cart_axes": cart_axes, "plate_axes": plate_axes}
         axes = [
-            d[0] if a is None else floats(a) for a, d in zip((cart_axes, plate_axes), default, strict=True)
+            along[0] if found is None else mounting_axes(place, name, found, shape)
+            for (name, found), along in zip(given.items(), default, strict=True)
         ]
-        count = len(robot.geometry.length)
-        for name, array in zip(("cart_axes", "plate_axes"), axes, strict=True):
-            if array.shape != (count, 3) or not (np.abs(array).max(axis=1) > 0).all():
-                raise ModelError(
-                    f"Kinematics.ball_joint_angles: found {name} of shape {array.shape}, expected ({count}, 3), a row a "
-                    "link, none of them zero; give one axis for each link"
-                )
-        links = _directions(robot, q, at.r, R)
+        links = robot.geometry.link_directions(q, at.r, R)
         found = np.stack([angle_between(link, axis) for link, axis in zip(links, axes, strict=True)], axis=2)
         return answered(at.one, found)[0]
 
@@ -335,12 +332,6 @@ class Kinematics(Record):
         return arm if arm.in_a_row else ModelFunctions(*robot)
 
 
-def _length(tolerance: float) -> float:
-    if not 0 <= real(tolerance) < np.inf:
-        raise ModelError(f"Kinematics: found tolerance={tolerance!r}, expected a length of at least 0, in m")
-    return real(tolerance)
-
-
 def driven_joints(dae: Dae) -> tuple[str, ...]:
     """Coordinates that the inputs of a model drive: `x.s` beside a force `x.f`, `x.phi` beside a torque `x.tau`."""
     known = set(dae.variables)
@@ -353,15 +344,3 @@ def driven_joints(dae: Dae) -> tuple[str, ...]:
             "torques x.tau beside x.phi, where x is a component; name the actuator coordinates by joints="
         )
     return (*lengths, *angles)
-
-
-def _directions(
-    robot: RodRobot, q: np.ndarray, r: np.ndarray, R: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors of links in the axes of what carries them, and in plate axes, (N, m, 3)."""
-    _, u, _, _ = robot.geometry.slopes(q, r, R)
-    on_cart = np.empty_like(u)
-    for arm in robot.geometry.arms:
-        links = robot.geometry.links_of(arm)
-        on_cart[:, links] = u[:, links] @ robot.geometry.frames(arm, q)[1]
-    return on_cart, u @ R

@@ -90,7 +90,9 @@ class ModelFunctions:
         by_joints = solved(self._slopes_of(x), np.broadcast_to(np.eye(count), (len(x), count, count)))
         if self.places == (0, 1, 2):
             return by_joints
-        moves = self._following.slopes_around(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
+        moves = (
+            self._following.jacobian_around(*self._arguments(x)) if count < 6 else np.zeros((len(x), 0, 0))
+        )
         if R is None:  # as then the joints do not choose it
             return self._in_reach(moves[:, :3] @ by_joints, r, R)
         if count == 6:
@@ -161,7 +163,7 @@ class ModelFunctions:
     @property
     def _moves(self) -> np.ndarray:
         """What the joints do at the start to the position, and to elements 1 to 3 of the quaternion, (3 or 6, n)."""
-        slopes = self._forward.slopes(*self.home.q[:, None])[0]
+        slopes = self._forward.jacobian(*self.home.q[:, None])[0]
         if f"{self.tool}.q" not in self.dae.vectors:
             return slopes[:3]
         moves = twists(slopes[None], self.home.R[None])[0]
@@ -205,7 +207,7 @@ class ModelFunctions:
 
     def _slopes_of(self, x: np.ndarray) -> np.ndarray:
         """Slopes of the joints by the coordinates of poses, (N, n, n)."""
-        return whole(self._inverse.slopes_around(*self._arguments(x)))
+        return whole(self._inverse.jacobian_around(*self._arguments(x)))
 
     @cached_property
     def _forward(self) -> ArrayFunction:

@@ -1,10 +1,12 @@
 """Poses and joints as arrays: one or many in, checked, and answered in the shape that was asked."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array
+from gantrytau.border.refusal import Given, ModelError
 
 NOT_ROTATION = 1e-6  # of an element of R.T R - I
 
@@ -19,22 +21,16 @@ class Poses:
 
 
 def vectors(value: object, size: int, name: str, place: str) -> tuple[np.ndarray, bool]:
-    """(N, size) of (size,) or (N, size), and whether it was one; infinite numbers as NaN.
-
-    ModelError for any other shape.
-    """
-    array = _numbers(value, name, place)
-    with np.errstate(invalid="ignore", over="ignore"):
-        if not np.isfinite(array.sum()):
-            array = np.where(np.isinf(array), np.nan, array)
-    if array.shape == (size,):
-        return array[None], True
-    if array.ndim == 2 and array.shape[1] == size:
-        return array, False
-    raise ModelError(
-        f"{place}: found {name} of shape {array.shape}, expected ({size},) or (N, {size}), one row a pose; "
-        f"reshape it"
+    """(N, size) of (size,) or (N, size), and whether it was one; infinite numbers as NaN."""
+    # arrays as they are wanted are not copied: there may be millions of rows
+    ready = (
+        isinstance(value, np.ndarray) and value.dtype == float and value.ndim == 2 and value.shape[1] == size
     )
+    found: Any = value if ready else array(place, name, value, (size,), (None, size), finite=False)
+    with np.errstate(invalid="ignore", over="ignore"):
+        if not np.isfinite(found.sum()):
+            found = np.where(np.isinf(found), np.nan, found)
+    return (found[None], True) if found.ndim == 1 else (found, False)
 
 
 def poses(r: object, R: object, place: str) -> Poses:
@@ -42,23 +38,32 @@ def poses(r: object, R: object, place: str) -> Poses:
     positions, one = vectors(r, 3, "r", place)
     if R is None:
         return Poses(positions, None, one)
-    array = _numbers(R, "R", place)
-    if array.shape not in ((3, 3), (len(positions), 3, 3)):
-        raise ModelError(
-            f"{place}: found R of shape {array.shape}, expected (3, 3) or ({len(positions)}, 3, 3), as r has "
-            f"{len(positions)} rows; give one orientation, or one for each row"
-        )
-    array = np.broadcast_to(array, (len(positions), 3, 3))
+    turns = rotations(place, "R", R, len(positions), finite=False)
+    return Poses(positions, np.broadcast_to(turns, (len(positions), 3, 3)), one)
+
+
+def rotations(place: str, name: str, value: object, count: int, *, finite: bool = True) -> np.ndarray:
+    """Rotation matrices, (3, 3) or one for each of so many rows, (count, 3, 3); ModelError for what is none."""
+    found = array(place, name, value, (3, 3), (count, 3, 3), finite=finite)
+    each = found.reshape(-1, 3, 3)
     with np.errstate(invalid="ignore"):
-        gap = np.abs(np.swapaxes(array, 1, 2) @ array - np.eye(3)).max(axis=(1, 2))
-        wrong = np.flatnonzero((gap > NOT_ROTATION) | (np.linalg.det(array) < 0))
+        gap = np.abs(np.swapaxes(each, 1, 2) @ each - np.eye(3)).max(axis=(1, 2))
+        wrong = np.flatnonzero((gap > NOT_ROTATION) | (np.linalg.det(each) < 0))
     if wrong.size:
-        rows = ", ".join(map(str, wrong[:5])) + (", ..." if wrong.size > 5 else "")
         raise ModelError(
-            f"{place}: found matrices R that are no rotations, in rows {rows}, expected R.T @ R = I and det R = 1; "
-            "orthonormalise them"
+            f"found no rotation in row {wrong[0]} of {name}, expected R.T @ R = I and det R = 1; orthonormalise it",
+            place=place,
+            argument=name,
         )
-    return Poses(positions, array, one)
+    return found
+
+
+def mounting_axes(place: str, name: str, value: object, *shapes: tuple[int, ...]) -> np.ndarray:
+    """Directions of ball joints in one of the shapes, none of them zero."""
+    axes = array(place, name, value, *shapes)
+    if not (np.linalg.norm(axes, axis=-1) > 0).all():
+        raise ModelError("expected directions, none of them zero", place=place, found=Given(name, value))
+    return axes
 
 
 def answered(one: bool, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -84,12 +89,3 @@ def floats(value: object) -> np.ndarray:
 def shown(value: object) -> str:
     """A value in one line of a message."""
     return str(value.tolist()) if isinstance(value, np.ndarray) else repr(value)
-
-
-def _numbers(value: object, name: str, place: str) -> np.ndarray:
-    array = floats(value)
-    if array.shape == () and np.isnan(array):
-        raise ModelError(
-            f"{place}: found {name} = {shown(value)}, expected an array of numbers, not complex; give one row a pose"
-        )
-    return array

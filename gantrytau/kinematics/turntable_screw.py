@@ -17,8 +17,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
-from gantrytau.kinematics.poses import floats, real, shown
+from gantrytau.border.checks import array, number
+from gantrytau.border.refusal import Given, ModelError
 
 FLAT = 1e-6  # of OP and OQ: how far pivots may be from one plane across the axis
 
@@ -40,23 +40,17 @@ class TurntableScrew:
     lead: float
 
     def __post_init__(self):
-        for name in ("base", "crank"):
-            if not 0 < real(getattr(self, name)) < np.inf:
-                raise ModelError(
-                    f"TurntableScrew: found {name}={getattr(self, name)!r}, expected a distance above 0 in m",
-                    argument=name,
-                )
-        if not 0 < abs(real(self.angle)) < math.pi:
-            raise ModelError(
-                f"TurntableScrew: found angle={self.angle!r}, expected one between 0 and pi, or between -pi and 0, in rad: "
-                "at 0 and pi the screw points to the axis; convert degrees with math.radians",
-                argument="angle",
-            )
-        if not 0 < abs(real(self.lead)) < np.inf:
-            raise ModelError(
-                f"TurntableScrew: found lead={self.lead!r}, expected the travel of a turn in m, not 0",
-                argument="lead",
-            )
+        kind = type(self).__name__
+        for name, unit, limits in (
+            ("base", "m", dict(above=0.0)),
+            ("crank", "m", dict(above=0.0)),
+            ("angle", "rad", dict(above=-math.pi, below=math.pi)),
+            ("lead", "m", {}),
+        ):
+            found = number(kind, name, getattr(self, name), unit=unit, **limits)
+            if found == 0:
+                raise ModelError("expected another number than 0", place=kind, found=Given(name, found))
+            object.__setattr__(self, name, found)
 
     @classmethod
     def of_places(cls, *, axis: ArrayLike, base: ArrayLike, nut: ArrayLike, lead: float) -> Self:
@@ -65,14 +59,8 @@ class TurntableScrew:
         Raises ModelError for shapes, pivots on the axis, and pivots that are not in one plane across it: that screw would
         swing out of its plane.
         """
-        vectors = {"axis": floats(axis), "base": floats(base), "nut": floats(nut)}
-        for name, vector in vectors.items():
-            if vector.shape != (3,) or not np.isfinite(vector).all():
-                raise ModelError(
-                    f"TurntableScrew.of_places: found {name} = {shown(vector)}, expected three finite numbers",
-                    argument=name,
-                )
-        way, start, end = vectors.values()
+        given = {"axis": axis, "base": base, "nut": nut}
+        way, start, end = (array("TurntableScrew.of_places", name, one, (3,)) for name, one in given.items())
         size = np.linalg.norm(way)
         if size == 0:
             raise ModelError(
@@ -111,7 +99,8 @@ class TurntableScrew:
 
     def turntable(self, theta: Any) -> np.ndarray:
         """The angle of the turntable with the motor at theta, rad; NaN where the screw does not get so long or so short."""
-        length = self._length(self.angle) + _numbers(theta, "theta") * self.lead / (2 * math.pi)
+        theta = array("TurntableScrew", "theta", theta, unit="rad", finite=False)
+        length = self._length(self.angle) + theta * self.lead / (2 * math.pi)
         with np.errstate(invalid="ignore"):
             # half angles keep their digits near both dead centres
             far = (self.base + self.crank) ** 2 - length**2
@@ -138,7 +127,7 @@ class TurntableScrew:
 
     def _opening(self, phi: Any) -> np.ndarray:
         """The angle from OP to OQ; NaN at the dead centres and beyond."""
-        found = _numbers(phi, "phi")
+        found = array("TurntableScrew", "phi", phi, unit="rad", finite=False)
         least, most = self.range
         with np.errstate(invalid="ignore"):
             return np.where((found > least) & (found < most), self.angle + found, np.nan)[()]
@@ -148,11 +137,3 @@ class TurntableScrew:
         return np.sqrt(
             (self.base - self.crank) ** 2 + 4 * self.base * self.crank * np.sin(np.asarray(opening) / 2) ** 2
         )
-
-
-def _numbers(value: Any, name: str) -> np.ndarray:
-    """Numbers as an array of floats; ModelError for what holds none."""
-    found = floats(value)
-    if found.shape == () and np.isnan(found) and not isinstance(value, (float, np.floating)):
-        raise ModelError(f"TurntableScrew: found {name} = {shown(value)}, expected numbers in rad")
-    return found

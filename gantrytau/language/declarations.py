@@ -29,6 +29,18 @@ class StateSelect(enum.IntEnum):
     ALWAYS = 4
 
 
+def _arithmetic(operation: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """An operator between formulas, and its reflection."""
+    return lambda a, b: Formula(operation, a, b), lambda a, b: Formula(operation, b, a)
+
+
+def _no_relation(sign: str) -> Callable[..., Any]:
+    def refuse(a: Any, b: Any) -> Any:
+        raise ModelError(f"'{sign}' between declarations in a class body: equations stand in equations(self)")
+
+    return refuse
+
+
 class Formula:
     """An expression of declarations, evaluated when the model that contains it is instantiated."""
 
@@ -50,41 +62,13 @@ class Formula:
             return f"{names[0]}[{names[1]}]"
         return f"{getattr(self._function, '__name__', 'a function')}({', '.join(names)})"
 
-    def __add__(self, other: Any) -> Any:
-        return Formula(operator.add, self, other)
-
-    def __radd__(self, other: Any) -> Any:
-        return Formula(operator.add, other, self)
-
-    def __sub__(self, other: Any) -> Any:
-        return Formula(operator.sub, self, other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return Formula(operator.sub, other, self)
-
-    def __mul__(self, other: Any) -> Any:
-        return Formula(operator.mul, self, other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return Formula(operator.mul, other, self)
-
-    def __truediv__(self, other: Any) -> Any:
-        return Formula(operator.truediv, self, other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return Formula(operator.truediv, other, self)
-
-    def __pow__(self, other: Any) -> Any:
-        return Formula(operator.pow, self, other)
-
-    def __rpow__(self, other: Any) -> Any:
-        return Formula(operator.pow, other, self)
-
-    def __matmul__(self, other: Any) -> Any:
-        return Formula(operator.matmul, self, other)
-
-    def __rmatmul__(self, other: Any) -> Any:
-        return Formula(operator.matmul, other, self)
+    __add__, __radd__ = _arithmetic(operator.add)
+    __sub__, __rsub__ = _arithmetic(operator.sub)
+    __mul__, __rmul__ = _arithmetic(operator.mul)
+    __truediv__, __rtruediv__ = _arithmetic(operator.truediv)
+    __pow__, __rpow__ = _arithmetic(operator.pow)
+    __matmul__, __rmatmul__ = _arithmetic(operator.matmul)
+    __le__, __ge__, __lt__, __gt__ = map(_no_relation, ("<=", ">=", "<", ">"))
 
     def __neg__(self) -> Any:
         return Formula(operator.neg, self)
@@ -101,28 +85,10 @@ class Formula:
             raise AttributeError(f"{type(self).__name__} has no attribute '{name}'")
         return Formula(operator.attrgetter(name), self)
 
-    def __le__(self, other: Any) -> Any:
-        return _no_relation("<=")
-
-    def __ge__(self, other: Any) -> Any:
-        return _no_relation(">=")
-
-    def __lt__(self, other: Any) -> Any:
-        return _no_relation("<")
-
-    def __gt__(self, other: Any) -> Any:
-        return _no_relation(">")
-
     def __eq__(self, other: Any) -> Any:
-        if self is other:
-            return True
-        return _no_relation("==")
+        return True if self is other else _no_relation("==")(self, other)
 
     __hash__ = object.__hash__
-
-
-def _no_relation(sign: str) -> Any:
-    raise ModelError(f"'{sign}' between declarations in a class body: equations stand in equations(self)")
 
 
 def evaluate(value: Any, scope: Any) -> Any:
@@ -200,10 +166,8 @@ class Quantity(Formula):
             found = self
         if found is self or isinstance(found, Quantity):
             raise ModelError(
-                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which "
-                "is not a "
-                f"member of {type(scope).__name__}; refer to a parameter of the class that holds the "
-                "expression"
+                f"{type(scope).__name__}: the expression refers to '{self.owner}.{self.name}', which is not a member of "
+                f"{type(scope).__name__}; refer to a parameter of the class that holds the expression"
             )
         return found
 
@@ -363,7 +327,7 @@ class Start:
 
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
-        return dict(start=self.value, fixed=self.fixed)
+        return dict(start=self.value, fixed=self.fixed) if self.value is not None else dict(fixed=self.fixed)
 
 
 class Fixed(Start):
@@ -384,7 +348,7 @@ class Bounds:
 
     def attributes(self) -> dict[str, Any]:
         """The attributes of the variable that this modification sets."""
-        return dict(min=self.min, max=self.max)
+        return {key: limit for key, limit in (("min", self.min), ("max", self.max)) if limit is not None}
 
 
 def is_setting(value: Any, name: str) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.declarations import Discrete
 from gantrytau.language.functions import if_else, logic_and, logic_or
@@ -252,4 +253,6 @@ def transition(
     simulation. period: s, a number or an expression of parameters: the guard is looked at only at t0 + k * period, with the
     values just before.
     """
+    if priority is not None:
+        number("transition", "priority", priority)
     return Transition(mode, source, target, guard, actions, priority, period)

@@ -212,9 +212,7 @@ def _starts(modifications: Mapping[str, Any], path: str = "") -> Iterator[str]:
 
 def _attributes(value: Any) -> Any:
     """Start, Fixed and Bounds as the attributes that they set, so that one does not erase the other."""
-    if isinstance(value, (Start, Bounds)):
-        return {key: x for key, x in value.attributes().items() if x is not None}
-    return value
+    return value.attributes() if isinstance(value, (Start, Bounds)) else value
 
 
 def _written(value: Any) -> str:

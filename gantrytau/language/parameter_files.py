@@ -7,7 +7,6 @@ from typing import Any
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.border.schema import read_toml
-from gantrytau.border.units import si
 
 OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
 
@@ -17,9 +16,7 @@ def read_parameters(file: Path) -> dict[str, Any]:
     table = read_toml(file)
     found: dict[str, Any] = {}
     for name, value in _leaves("", table):
-        if isinstance(value, str):
-            _check_unit(f"{file}: {name}", value)
-        elif not _numeric(value):
+        if not _numeric(value):
             raise ModelError(f"{file}: found {name} = {value!r}, expected a number or a vector")
         found[name] = value
     if not found:
@@ -48,17 +45,7 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def _numeric(value: Any) -> bool:
     if isinstance(value, list):
         return bool(value) and all(_numeric(part) for part in value)
-    if isinstance(value, str):
-        _check_unit("", value)
-    return isinstance(value, (bool, int, float, str))
-
-
-def _check_unit(place: str, text: str) -> None:
-    """ModelError unless a text is a value with its unit; what it is of, the model finds out."""
-    try:
-        si(text)
-    except ModelError as error:
-        raise ModelError(f"{place}: {str(error).removeprefix('si: ')}") from None
+    return isinstance(value, (bool, int, float, str))  # of a text, the model finds out what its unit must be
 
 
 def parameter_text(modifications: Mapping[str, Any], model: str, heading: str = "") -> str:

@@ -157,5 +157,5 @@ def _attributes(old: Any) -> dict[str, Any]:
     if isinstance(old, Mapping):
         return dict(old)
     if isinstance(old, (Start, Bounds)):
-        return {key: item for key, item in old.attributes().items() if item is not None}
+        return old.attributes()
     return {"value": old}

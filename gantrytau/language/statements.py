@@ -44,12 +44,17 @@ class Equation:
         if self.label:
             return self.label
         row = "" if self.element is None else f", row {self.element}"
-        return f"{self.path or 'the model'} ({self.model}), equation {self.number}{row}"
+        return place_of(self.path, self.model, self.number) + row
 
     @property
     def text(self) -> str:
         """The equation as written."""
         return f"{self.left} == {self.right}"
+
+
+def place_of(path: str, model: str, number: int | None = None) -> str:
+    """Where a statement stands: its component, and its number there."""
+    return f"{path or 'the model'} ({model})" + ("" if number is None else f", equation {number}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +113,8 @@ def connect(a: Any, b: Any) -> Connection:
     """
     if not all(isinstance(end, Connector) for end in (a, b)) and any(isinstance(x, Declared) for x in (a, b)):
         raise ModelError(
-            f"connect({_kind(a)}, {_kind(b)}): expected two connectors; name those of the components, "
-            "such as "
-            "connect(mass.flange, spring.flange_a)"
+            f"connect({type(a).__name__}, {type(b).__name__}): expected two connectors; name those of the components, such "
+            "as connect(mass.flange, spring.flange_a)"
         )
     return Connection(a, b)
 
@@ -161,24 +165,22 @@ def root(
     return Root(connector, values, coordinates, tuple(equations))
 
 
-def _kind(value: Any) -> str:
-    return type(value).__name__
-
-
 def equality(statement: Any, path: str, model: str, number: int) -> list[Equation]:
     """The scalar equations of one yielded `a == b`; ModelError if it is no equation or the shapes differ."""
     if isinstance(statement, Constraint):
         found = equality(statement.equation, path, model, number)
         duals = [dual.name() for dual in scalars(statement.dual)]
         return [replace(e, dual=duals[e.element or 0]) for e in found]
-    place = f"{path or 'the model'} ({model}), equation {number}"
+    place = place_of(path, model, number)
     if isinstance(statement, (bool, np.bool_)):
         raise ModelError(
             f"{place}: found {statement!r}, expected an equation `a == b` of symbols; Python compared the "
             "two sides itself. Join symbols with casadi.vertcat(...) instead of a list"
         )
     if isinstance(statement, Between) or not isinstance(statement, (ca.SX, ca.DM)):
-        raise ModelError(f"{place}: found {_kind(statement)}, expected an equation `a == b` or connect(a, b)")
+        raise ModelError(
+            f"{place}: found {type(statement).__name__}, expected an equation `a == b` or connect(a, b)"
+        )
     found: list[Equation] = []
     elements = scalars(statement)
     for row, element in enumerate(elements):
@@ -187,26 +189,18 @@ def equality(statement: Any, path: str, model: str, number: int) -> list[Equatio
                 raise ModelError(f"{place}: both sides are constants that differ, so it can never hold")
             continue
         if not element.is_op(ca.OP_EQ):
-            found_text = str(element)
-            raise ModelError(f"{place}: found '{found_text[:80]}', expected an equation; write `a == b`")
+            raise ModelError(f"{place}: found '{str(element)[:80]}', expected an equation; write `a == b`")
         found.append(
             Equation(element.dep(0), element.dep(1), path, model, number, row if len(elements) > 1 else None)
         )
     if not found:
         raise ModelError(f"{place}: both sides are the same, so it says nothing; remove it or correct it")
-    _check_shapes(found, place)
-    return found
-
-
-def _check_shapes(rows: list[Equation], place: str) -> None:
     # CasADi repeats a scalar to fit a vector; a number may stand for a vector of numbers, a symbol may not
-    if len(rows) < 2:
-        return
-    for side in ("left", "right"):
-        nodes = [getattr(row, side) for row in rows]
-        if not nodes[0].is_constant() and len({node.element_hash() for node in nodes}) == 1:
+    for nodes in ([e.left for e in found], [e.right for e in found]):
+        once = len(nodes) > 1 and len({node.element_hash() for node in nodes}) == 1
+        if once and not nodes[0].is_constant():
             raise ModelError(
-                f"{place}: found shapes ({len(rows)},) and () in '{rows[0].text}' and the rows below, "
-                "expected "
-                "the same shape on both sides; index the vector, or repeat the scalar in separate equations"
+                f"{place}: found shapes ({len(found)},) and () in '{found[0].text}' and the rows below, expected the same "
+                "shape on both sides; index the vector, or repeat the scalar in separate equations"
             )
+    return found

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from gantrytau.border.checks import whole
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.instructions import refuse_calls
 
@@ -30,13 +31,14 @@ class Derivative(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Symbol:
-    """A scalar symbol: a variable, a parameter, or the `order`-th derivative of variable `base`."""
+    """A scalar symbol: a variable, a parameter, or the `order`-th derivative of variable `base`.
+
+    kind: real, input, output, discrete, flow, parameter, propagated; pre: a value just before an instant.
+    """
 
     name: str
     sx: ca.SX
-    kind: (
-        str  # real, input, output, discrete, flow, parameter, propagated; pre: a value just before an instant
-    )
+    kind: str
     base: str
     order: int
 
@@ -211,8 +213,7 @@ def der(expression: Any, order: int = 1) -> ca.SX:
 
     order: how often it is differentiated. Raises ModelError outside of the equations of a model.
     """
-    if isinstance(order, bool) or not isinstance(order, int) or order < 1:
-        raise ModelError(f"der: found order {order!r}, expected a whole number of at least 1")
+    whole("der", "order", order, least=1)
     symbols = _current.get()
     if symbols is None:
         raise ModelError(

@@ -3,19 +3,7 @@
 Angle phi of a flange is absolute, its torque tau is positive into the component.
 """
 
-from gantrytau import (
-    Connector,
-    Flow,
-    Input,
-    Model,
-    Output,
-    Parameter,
-    Real,
-    der,
-    require,
-    stick_slip,
-    tanh,
-)
+from gantrytau import Connector, Flow, Input, Model, Output, Parameter, Real, der, require, stick_slip, tanh
 from gantrytau.mechanics.friction_laws import (
     asymmetric_friction,
     dahl_rate,

@@ -35,10 +35,8 @@ def data_frame(result: Series, names: Sequence[str], display: Display = None) ->
 def scalars(result: Series, names: Iterable[str]) -> list[str]:
     """Names of scalars, each once: all, or those that are named and elements of vectors; ModelError for an unknown name."""
     if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise ModelError(
-            f"to_pandas: found {names!r}, expected names one by one, as to_pandas('x', 'tool.r')",
-            argument="names",
-        )
+        words = f"found {names!r}, expected names one by one, as to_pandas('x', 'tool.r')"
+        raise ModelError(words, place="to_pandas", argument="names")
     found: dict[str, None] = {}
     for name in names or result.names:
         result.unit(name)  # an unknown name raises

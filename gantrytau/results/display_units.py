@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gantrytau.border.checks import instance
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.border.units import Scale, known_scale, scale
 from gantrytau.results.series import Series, split_element
@@ -39,14 +40,10 @@ def shown_units(
     measures something else, and for unknown names.
     """
     names = list(dict.fromkeys(names))
-    place = f"{result.title or 'Result'}: {verb}: display"
+    around, place = f"{result.title or 'Result'}: {verb}", "display"
     if display is None:
         display = default
-    if not isinstance(display, (str, Mapping)):
-        raise ModelError(
-            f"{place}: found {display!r}, expected a unit, or units by names, {{'phi': 'deg'}}",
-            argument="display",
-        )
+    instance(around, "display", display, (str, Mapping), "a unit, or {name: unit}")
     base = display if display in (SI, DECLARED) else default
     chosen = {name: result.display(name) for name in names} if base == DECLARED else {}
     try:
@@ -56,7 +53,7 @@ def shown_units(
             chosen |= _wherever(result, names, display, place)
         return {name: _shown(result, name, chosen.get(name, ""), place) for name in names}
     except ModelError as error:
-        raise ModelError(str(error), argument="display") from None
+        raise ModelError(str(error), place=around, argument="display") from None
 
 
 def _shown(result: Series, name: str, text: str, place: str) -> Shown:

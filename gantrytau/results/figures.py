@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
@@ -97,10 +97,8 @@ def check_suffix(file: str | os.PathLike[str]) -> None:
     suffix, formats = Path(file).suffix, sorted(FigureCanvasBase.get_supported_filetypes())
     if suffix.removeprefix(".").lower() not in formats:
         known = ", ".join(f".{name}" for name in formats)
-        raise ModelError(
-            f"plot: found the file '{file}' with the suffix '{suffix}', expected one of {known}; name the file "
-            f"{Path(file).stem}.png, for example"
-        )
+        words = f"expected one of {known}; name the file {Path(file).stem}.png, for example"
+        raise ModelError(words, place="plot", found=Given("file", str(file)))
 
 
 def has_windows(backend: str) -> bool:

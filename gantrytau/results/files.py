@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean
+from gantrytau.border.refusal import GantryTauError, Given, ModelError, did_you_mean
 from gantrytau.results.display_units import SI, Display, Shown, shown_units
 from gantrytau.results.series import Series
 from gantrytau.whole_files import replacing
@@ -24,8 +24,9 @@ def save(result: Series, path: str | os.PathLike[str], display: Display = None) 
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise ModelError(
-            f"{path}: found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
-            + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0]
+            f"found the suffix '{path.suffix}', expected one of {', '.join(_WRITERS)}"
+            + did_you_mean(path.suffix.lower(), _WRITERS).partition("; there is")[0],
+            place=str(path),
         )
     if writer is _write_csv:
         shown = shown_units(result, ("time", *result.names), display, SI, "save")
@@ -33,11 +34,8 @@ def save(result: Series, path: str | os.PathLike[str], display: Display = None) 
             _write_csv(result, partial, shown)
         return path
     if display not in (None, SI):
-        raise ModelError(
-            f"{path}: save: found display={display!r}, expected none: '{path.suffix}' holds SI, and the units beside the "
-            "numbers; leave it out, or save a .csv",
-            argument="display",
-        )
+        words = f"expected none: '{path.suffix}' holds SI, and the units beside the numbers; leave it out, or save a .csv"
+        raise ModelError(words, place=f"{path}: save", found=Given("display", display))
     with replacing(path) as partial:
         writer(result, partial)
     return path
@@ -50,10 +48,7 @@ def dataset(result: Series) -> "xarray.Dataset":
     variables = {}
     for name in (*result.arrays, *(name for name in result.names if name not in elements)):
         values = result[name]
-        dimensions = (
-            "time",
-            *(f"axis{k}_{n}" for k, n in enumerate(values.shape[1:])),
-        )
+        dimensions = ("time", *(f"axis{k}_{n}" for k, n in enumerate(values.shape[1:])))
         variables[name] = (dimensions, values, _attributes(result, name))
     time = ("time", result.time, {"units": "s", "long_name": "time"})
     return xarray.Dataset(variables, coords={"time": time}, attrs={"title": result.title})

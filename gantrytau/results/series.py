@@ -213,9 +213,7 @@ class Series:
         values: dict[str, Values] = {}
         for name in names:
             elements = self._arrays[name].flat if name in self._arrays else [name]
-            values.update(
-                (str(element), self[str(element)]) for element in elements
-            )  # an unknown name raises
+            values.update((str(e), self[str(e)]) for e in elements)  # an unknown name raises
         units = {name: self.unit(name) for name in values}
         words = {name: self.description(name) for name in values}
         own: dict[str, Any] = dict(title=self._title, held=self._held & values.keys(), ended=self._ended)

@@ -37,10 +37,7 @@ def signal_key(signal: Signal) -> tuple[str, object]:
 
 
 def read_signals(
-    given: Mapping[str, Any],
-    flat: FlatModel,
-    span: Span,
-    seed: int | None = None,
+    given: Mapping[str, Any], flat: FlatModel, span: Span, seed: int | None = None
 ) -> dict[str, Signal]:
     """Signals by scalar name.
 

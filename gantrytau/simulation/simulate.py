@@ -7,16 +7,18 @@ that only the choice makes. Constraints and their derivatives are kept by projec
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau.border.refusal import DoubtfulResult, ModelError, SolveError
+from gantrytau.border.checks import check_words, number, whole
+from gantrytau.border.refusal import DoubtfulResult, Given, ModelError, SolveError
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
 from gantrytau.compiler.start.other_starts import with_starts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model
+from gantrytau.inputs.input_signal import check_seed
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
@@ -31,6 +33,9 @@ from gantrytau.simulation.state_sizes import first_sizes, seen_sizes
 from gantrytau.simulation.to_result import doubts, result_of
 
 MARGIN = 0.1  # of the tolerance of the result, left to one step of the integrator: errors add up
+NUMBERS: dict[str, dict[str, Any]] = dict(
+    start=dict(unit="s"), tolerance=dict(above=0.0, below=1.0), max_step=dict(unit="s", above=0.0)
+)
 ROUNDS = 3  # of a run whose states prove to be smaller than was thought
 
 
@@ -74,16 +79,12 @@ def simulate(
     Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
     `.ended` says what `terminate` said.
     """
-    _check(start, stop, tolerance, points, max_step)
-    _check_words(limits=limits, singular=singular)
-    dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
-    if parameters:
-        dae = retranslate(dae, with_values(dae.flat, parameters))
+    policy = checked_policy("simulate", locals())
+    start, tolerance, max_step = policy["start"], policy["tolerance"], policy["max_step"]
+    stop = number("simulate", "stop", stop, unit="s", above=start)
+    check_seed("simulate", seed)
     wanted = names(outputs or ())
-    for name in wanted:
-        dae.expand(name)
-    if any(split_derivative(name)[1] for name in wanted):
-        dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
+    dae = _changed(model, parameters, wanted)
     dae = stopping(dae) if limits == "stop" else dae
     dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)
@@ -94,6 +95,32 @@ def simulate(
         if doubt:
             warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
     return result
+
+
+def checked_policy(place: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The arguments of `simulate` that are given, numbers in SI; ModelError for words and numbers that they cannot be."""
+    check_words(simulate, given, place)
+    found = dict(given)
+    for name, limits in NUMBERS.items():
+        if name in found and not (found[name] is None and name == "max_step"):
+            found[name] = number(place, name, found[name], **limits)
+    if "points" in found:
+        whole(place, "points", found["points"], least=2)
+    return found
+
+
+def _changed(
+    model: Model | Translated, parameters: Mapping[str, Any] | None, wanted: Sequence[str]
+) -> Translated:
+    """A model with other parameters, in which the wanted derivatives are found."""
+    dae = with_sticking(model if isinstance(model, Translated) else translate_model(model))
+    if parameters:
+        dae = retranslate(dae, with_values(dae.flat, parameters))
+    for name in wanted:
+        dae.expand(name)
+    if any(split_derivative(name)[1] for name in wanted):
+        dae = translate_flat(dae.flat, replace(dae.request, find=(*dae.request.find, *wanted)))
+    return dae
 
 
 def _all_runs(
@@ -175,43 +202,12 @@ def _sized_run(
         coordinates, left = coordinates.sized(sizes), left - 1
 
 
-def _check(start: float, stop: float, tolerance: float, points: int, max_step: float | None) -> None:
-    numbers = all(isinstance(t, (int, float, np.number)) for t in (start, stop))
-    if not (numbers and np.isfinite(start) and np.isfinite(stop) and stop > start):
-        raise ModelError(
-            f"simulate: found start={start!r} and stop={stop!r}, expected start < stop, both finite numbers in s",
-            argument="stop",
-        )
-    if not isinstance(tolerance, (float, np.floating)) or not 0 < tolerance < 1:
-        raise ModelError(
-            f"simulate: found tolerance={tolerance!r}, expected a number between 0 and 1, as 1e-8",
-            argument="tolerance",
-        )
-    if max_step is not None and not (isinstance(max_step, (int, float, np.number)) and 0 < max_step < np.inf):
-        raise ModelError(
-            f"simulate: found max_step={max_step!r}, expected a number above zero, in s", argument="max_step"
-        )
-    if isinstance(points, bool) or not isinstance(points, (int, np.integer)) or points < 2:
-        raise ModelError(
-            f"simulate: found points={points!r}, expected a whole number of at least 2", argument="points"
-        )
-
-
-def _check_words(**given: object) -> None:
-    for argument, found in given.items():
-        words = get_args(simulate.__annotations__[argument])
-        if found not in words:
-            raise ModelError(
-                f"simulate: found {argument}={found!r}, expected {' or '.join(map(repr, words))}",
-                argument=argument,
-            )
-
-
 def _check_inputs(dae: Translated, signals: Mapping[str, Signal]) -> None:
     for name in signals:
         if name not in dae.inputs:
             raise ModelError(
-                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.inputs) or 'none'}); "
-                "to impose it, translate with given=..., to change a parameter use parameters=",
+                f"{name} is not an input of {dae.name} (inputs: {', '.join(dae.inputs) or 'none'}); to impose it, translate "
+                "with given=..., to change a parameter use ",
+                Given("parameters"),
                 argument="inputs",
             )

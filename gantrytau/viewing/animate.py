@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import instance, number
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.dae import Dae, translate
 from gantrytau.language.model import Model
 from gantrytau.results.result import Result
@@ -37,11 +38,7 @@ def view(
     from gantrytau.viewing.film import film_of
 
     dae = _translated(model)
-    if not isinstance(pose, Mapping | None):
-        raise ModelError(
-            f"view: found pose={pose!r}, expected values by name, {{'tool.r': [0.5, 2.8, -0.8]}}",
-            argument="pose",
-        )
+    instance("view", "pose", pose, (Mapping, type(None)), "values by name, {'tool.r': [0.5, 2.8, -0.8]}")
     values = dae.evaluate(dict(pose or {}))
     constants = {name: float(value) for name, value in dae.parameter_values.items()}
     pose_only = Result([0.0], {**constants, **dict(_scalars(values))}, title=dae.name, shapes=dae.flat.shapes)
@@ -66,14 +63,15 @@ def animate(
     """
     from gantrytau.viewing.film import film_of
 
+    speed = number("animate", "speed", speed, above=0.0)
     together = list(shown) if isinstance(shown, (list, tuple)) else [shown]
     if not together:
         raise ModelError("animate: found an empty list, expected results of simulate or optimize")
-    if isinstance(names, str):
-        raise ModelError(f"animate: found names={names!r}, expected a list of texts", argument="names")
-    if names is not None and len(names) != len(together):
+    if names is not None and (isinstance(names, str) or len(names) != len(together)):
         raise ModelError(
-            f"animate: found {len(names)} names for {len(together)} results, expected one for each"
+            f"expected a list of texts, one for each of {len(together)} results",
+            place="animate",
+            found=Given("names", names),
         )
     dae = None if model is None else _translated(model)
     films = [film_of(one, speed, dae, around) for one in together]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border.checks import array
 from gantrytau.border.refusal import ModelError
 from gantrytau.dae import Dae
 from gantrytau.language.self_description.appearance import Shape, Value
@@ -64,15 +65,8 @@ class Film:
 
     def _numbers(self, what: Value, shape: tuple[int, ...]) -> np.ndarray:
         """Numbers of a shape; ModelError for what has another one, or is not finite."""
-        try:
-            found = np.asarray(what, dtype=float)
-        except (TypeError, ValueError):
-            found = np.array(np.nan)
+        found = array(self.title or "result", "shapes()", what)
         self._check(what, found, shape)
-        if not np.isfinite(found).all():
-            raise ModelError(
-                f"{self.title or 'result'}: found {what!r} in shapes(), expected names or finite numbers"
-            )
         return found
 
     def _check(self, what: Value, found: np.ndarray, shape: tuple[int, ...]) -> None:
@@ -128,12 +122,8 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     """What is to be shown of a Result or an optimum. speed: seconds of the motion in a second of the page; model: whose
     motion it is, where that does not say it; around: obstacles and whatever else has `shapes()` in numbers.
 
-    Raises ModelError for what has no motion in it, or nothing that could be seen, and for a speed that is not positive.
+    Raises ModelError for what has no motion in it, or nothing that could be seen.
     """
-    if not (isinstance(speed, (int, float)) and 0 < speed < np.inf):
-        raise ModelError(
-            f"animate: found speed={speed!r}, expected a positive number, 1 for real time", argument="speed"
-        )
     moved = getattr(shown, "motion", None)  # of a plan
     series = (
         shown if isinstance(shown, Series) else moved() if callable(moved) else getattr(shown, "result", None)

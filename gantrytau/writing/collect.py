@@ -12,21 +12,9 @@ from gantrytau.writing.syntax import ordered
 
 DIGITS = 14  # of numbers that arise from others: what rounding leaves beyond is dropped
 NOTHING = 1e-14  # of the largest part of a term, below which nothing but rounding is left of it
-ZERO_AT_ZERO = (
-    "sin",
-    "tan",
-    "asin",
-    "atan",
-    "sinh",
-    "tanh",
-    "asinh",
-    "atanh",
-    "abs",
-    "sign",
-    "sqrt",
-    "expm1",
-    "log1p",
-)
+ZERO_AT_ZERO = {
+    "sin", "tan", "asin", "atan", "sinh", "tanh", "asinh", "atanh", "abs", "sign", "sqrt", "expm1", "log1p",
+}  # fmt: skip
 Terms = dict[Node, float]
 
 
@@ -186,13 +174,8 @@ def _moving(graph: Graph, node: Node, still: dict[Node, Node], moving: dict[Node
 
 def _folded(graph: Graph, operation: str, arguments: Sequence[Node]) -> Node:
     """An operation with the zeros in it gone."""
-    arithmetic = {
-        "add": graph.add,
-        "sub": graph.subtract,
-        "neg": graph.negate,
-        "mul": graph.multiply,
-        "div": graph.divide,
-    }
+    arithmetic = {"add": graph.add, "sub": graph.subtract, "neg": graph.negate}
+    arithmetic |= {"mul": graph.multiply, "div": graph.divide}
     if operation in arithmetic:
         return arithmetic[operation](*arguments)
     if operation in ZERO_AT_ZERO and arguments[0].is_number(0.0):

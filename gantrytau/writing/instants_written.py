@@ -1,6 +1,6 @@
 """What is set at instants, as words around expressions, for every format of equations."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -9,7 +9,7 @@ from gantrytau.flattening.flat_model import Delay, FlatModel, Sampled, StickSlip
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.sections import symbol_names
 from gantrytau.writing.subexpressions import located, written
-from gantrytau.writing.syntax import Syntax, Written
+from gantrytau.writing.syntax import Syntax
 
 
 @dataclass(frozen=True)
@@ -67,26 +67,28 @@ def at_instants(flat: FlatModel) -> tuple[AtInstants, ...]:
     )
 
 
-def pieces_written(
-    one: AtInstants, syntax: Syntax
-) -> tuple[tuple[tuple[str, str], ...], tuple[list[str | Written], list[str | Written]]]:
-    """Common subexpressions of a statement as (name, expression); then the written pieces of the statement and of its note.
+def line_written(
+    one: AtInstants, syntax: Syntax, plain: Callable[[str], str] = str, formula: str = "{}"
+) -> tuple[tuple[tuple[str, str], ...], str, str]:
+    """Common subexpressions of a statement as (name, expression), the statement, and its note.
 
-    Pieces of text are returned unchanged.
+    plain: writes pieces of text; formula: what stands around the others.
     """
     graph, parts = Graph(), (one.says, one.note)
     with located(one.label):
         nodes = {id(p): _node(graph, p) for part in parts for p in part if isinstance(p, ca.SX | Truth)}
         text = written(nodes.values(), syntax)
-    found: dict[int, str | Written] = dict(zip(nodes, text.expressions, strict=True))
+    found = dict(zip(nodes, text.expressions, strict=True))
 
-    def said(piece: Piece) -> str | Written:
-        if isinstance(piece, Mention):
-            return syntax.symbol(piece.name)
-        return piece if isinstance(piece, str) else found[id(piece)]
+    def said(piece: Piece) -> str:
+        if isinstance(piece, str):
+            return plain(piece)
+        return formula.format(
+            (syntax.symbol(piece.name) if isinstance(piece, Mention) else found[id(piece)]).text
+        )
 
-    says, note = ([said(p) for p in part] for part in parts)
-    return text.definitions, (says, note)
+    says, note = ("".join(map(said, part)) for part in parts)
+    return text.definitions, says, note
 
 
 def _node(graph: Graph, piece: ca.SX | Truth) -> Node:

@@ -7,7 +7,7 @@ import re
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.writing.excerpt import Excerpt, excerpt
-from gantrytau.writing.instants_written import AtInstants, pieces_written
+from gantrytau.writing.instants_written import AtInstants, line_written
 from gantrytau.writing.names import GREEK, Name, name_of
 from gantrytau.writing.sections import Section, section_text
 from gantrytau.writing.subexpressions import written_at
@@ -157,10 +157,7 @@ def latex_text(dae: Translated) -> str:
 
 def _instant(one: AtInstants) -> list[str]:
     """A statement on instants as a sentence, and what its expressions share."""
-    shared, says = pieces_written(one, LatexSyntax())
-    words, note = (
-        "".join(escaped(p) if isinstance(p, str) else f"${p.text}$" for p in part) for part in says
-    )
+    shared, words, note = line_written(one, LatexSyntax(), escaped, "${}$")
     where = "".join(f", ${name} = {expression}$" for name, expression in shared)
     return [rf"\noindent {words}{where}{f' ({note})' if note else ''}\par"]
 

@@ -4,10 +4,10 @@ from collections.abc import Collection
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
-from gantrytau.writing.syntax import AND, CHOICE, OR, POWER, PRODUCT, SUM, Arguments, Written, infix
-from gantrytau.writing.text import WORDS, plain_number
+from gantrytau.writing.syntax import AND, CHOICE, OR, POWER, PRODUCT, SUM, Arguments, Written
+from gantrytau.writing.text import WORDS, PlainSyntax
 
-OPERATORS = {key: word for key, word in WORDS.items() if key not in ("==", "!=")}
+OPERATORS = WORDS.keys() - {"==", "!="}
 FUNCTIONS = {
     "abs": "abs", "sign": "sign", "sqrt": "sqrt", "exp": "exp", "log": "log",
     "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
@@ -39,7 +39,7 @@ def string(text: str) -> str:
     return f'"{escaped}"'
 
 
-class ModelicaSyntax:
+class ModelicaSyntax(PlainSyntax):
     """Modelica; `lowered` are the variables whose first derivative is a variable of its own."""
 
     name = "Modelica"
@@ -51,7 +51,7 @@ class ModelicaSyntax:
         """A number; ModelError for an infinite one."""
         if abs(value) == float("inf"):
             raise ModelError("found an infinite number, which Modelica cannot write; expected a finite one")
-        return Written(plain_number(value), SUM if value < 0 else 8, value < 0)
+        return super().number(value)
 
     def symbol(self, name: str) -> Written:
         """A quoted name, the derivative of one, or `time`."""
@@ -64,21 +64,12 @@ class ModelicaSyntax:
         """'shared 1', which is no name that Python could have."""
         return Written(quoted(f"shared {number}"))
 
-    def enclose(self, text: str) -> str:
-        """(text)."""
-        return f"({text})"
-
     def apply(self, operation: str, arguments: Arguments) -> Written | None:
         """Operators, `if`, the built-in functions, and what can be said with them."""
-        if operation == "select":
-            text = f"if {arguments.bare(0)} then {arguments.bare(1)} else {arguments.bare(2)}"
-            return Written(text, CHOICE)
-        found = infix(arguments, operation, OPERATORS)
-        if found is not None:
-            return found
+        if operation in OPERATORS or operation == "select":
+            return super().apply(operation, arguments)
         if operation in FUNCTIONS:
-            inside = ", ".join(arguments.bare(k) for k in range(len(arguments)))
-            return Written(f"{FUNCTIONS[operation]}({inside})")
+            return super().apply(FUNCTIONS[operation], arguments)
         return _paraphrase(operation, arguments)
 
 

@@ -2,7 +2,7 @@
 
 from gantrytau.compiler.translated import Translated
 from gantrytau.writing.excerpt import Excerpt, excerpt
-from gantrytau.writing.instants_written import AtInstants, at_instants, pieces_written
+from gantrytau.writing.instants_written import AtInstants, at_instants, line_written
 from gantrytau.writing.sections import Section, section_text
 from gantrytau.writing.subexpressions import written_at
 from gantrytau.writing.syntax import CHOICE, SUM, Arguments, Written, infix
@@ -83,9 +83,8 @@ def event_lines(dae: Translated) -> list[str]:
 
 def _instant(one: AtInstants) -> list[str]:
     """A statement on instants as a line, and lines with what its expressions share."""
-    text, says = pieces_written(one, PlainSyntax())
-    words, note = ("".join(s if isinstance(s, str) else s.text for s in part) for part in says)
-    where = [f"      with {name} = {expression}" for name, expression in text]
+    shared, words, note = line_written(one, PlainSyntax())
+    where = [f"      with {name} = {expression}" for name, expression in shared]
     return [words + (f"    # {note}" if note else ""), *where]
 
 

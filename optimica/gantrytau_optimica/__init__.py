@@ -22,7 +22,6 @@ from gantrytau_optimica.calibration.assessment.parameter_rows import (
 )
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
-from gantrytau_optimica.calibration.data.file_lines import in_lines
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.design.identifiability import identifiability
@@ -32,8 +31,8 @@ from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityT
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
 from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
-from gantrytau_optimica.calibration.devices.gauges import LengthGauge, Wires
-from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
+from gantrytau_optimica.calibration.devices.gauges import LengthGauge
+from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.diagnostics.device_frames import frame_words
 from gantrytau_optimica.calibration.error_analysis.error_maps import error_map
@@ -195,7 +194,6 @@ __all__ = [
     "TradeOff",
     "Tukey",
     "Way",
-    "Wires",
     "ZeroPhase",
     "arm_model",
     "at",
@@ -221,7 +219,6 @@ __all__ = [
     "identify_friction",
     "identify_servo",
     "identify_system",
-    "in_lines",
     "initial",
     "integral_of_squares",
     "is_planned",
@@ -248,7 +245,6 @@ __all__ = [
     "plot_q",
     "pose_sensitivities",
     "predict",
-    "predict_late",
     "prepare",
     "printed_models",
     "read_arms",

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gantrytau import ModelError, Result
+from gantrytau.border.refusal import Given
 from gantrytau.border.units import given as in_si
 from gantrytau.flattening.shapes import elements_of
 from gantrytau_optimica.answers.answer import Answer
@@ -24,10 +25,8 @@ def read_guesses(guess: Any, read: SymbolicProblem) -> dict[str, Any]:
     if isinstance(guess, (Result, Answer)):
         return guess_of(guess, read.dae)
     if guess is not None and not isinstance(guess, Mapping):
-        raise ModelError(
-            f"guess={guess!r}: expected {{name: number, array or function of time}}, a Result or an Optimum",
-            argument="guess",
-        )
+        expected = "expected {name: number, array or function of time}, a Result or an Optimum"
+        raise ModelError(expected, found=Given("guess", guess))
     found: dict[str, Any] = {}
     for name, value in (guess or {}).items():
         if isinstance(value, (Result, Answer)):
@@ -46,8 +45,6 @@ def parameter_names(read: SymbolicProblem, name: str) -> tuple[str, ...]:
     """Scalar names of a parameter; ModelError if it is none."""
     elements = read.dae.expand(name)
     if elements[0] not in read.dae.parameter_symbols:
-        raise ModelError(
-            f"{read.name}: {name} is no parameter, expected one; declare it as a Parameter",
-            argument="parameters",
-        )
+        why = f"{name} is no parameter, expected one; declare it as a Parameter"
+        raise ModelError(why, place=read.name, argument="parameters")
     return tuple(elements)

@@ -27,8 +27,7 @@ from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.transcription.mesh import with_jumps
-from gantrytau_optimica.transcription.shooting import shoot
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import Scheme, transcribe
 
 Problem = Optimization | type[Optimization] | SymbolicProblem
 
@@ -38,7 +37,7 @@ def optimize(
     *,
     elements: int | Sequence[float] = 50,
     points: int = 3,
-    scheme: str = "radau",
+    scheme: Scheme = "radau",
     lengths: Literal["given", "free"] = "given",
     guess: Guesses | None = None,
     controls: Mapping[str, Any] | None = None,
@@ -55,7 +54,8 @@ def optimize(
 
     problem: a subclass of Optimization or an instance.
     elements: their number, or their lengths relative to each other; points: in each (1 to 9); lengths: "free" lets the
-    optimiser place the borders. scheme: "radau", "gauss", or "shooting" (points: Runge-Kutta steps per element).
+    optimiser place the borders. scheme: "radau", "gauss", "lobatto" (points at both ends of an element, as Hermite and
+    Simpson's with three), or "shooting" (points: Runge-Kutta steps per element).
     guess: name -> number, array or function of time, or another solution; a component -> a solution of that component.
     Default: a straight line between given initial and final values, else start values.
     controls: input -> dict(kind="constant" | "linear" | "ramps", elements=1, max_step=None, step_penalty=0.0).
@@ -68,10 +68,8 @@ def optimize(
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.
     """
-    policy = Policy(
-        elements, points, scheme, lengths, guess, controls, causality, refine, starts, tolerance, max_iterations,
-        max_time, progress,
-    )  # fmt: skip
+    said = {name: value for name, value in locals().items() if name in PolicyKeywords.__annotations__}
+    policy = policy_of("optimize", PolicyKeywords, said)
     if record is not None:
         require_place(record)
     return _optimized(problem, policy, record)
@@ -135,13 +133,9 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     if policy.refine is not None or (policy.mesh.moving and policy.points > 1):
         # free borders would be moved to where limits are passed
         built = replace(built, problem=with_ramps(built.problem, meshes))
-    elif policy.points > 1 and not policy.shooting:
+    elif policy.points > 1 and policy.transcription.refinable:
         built = replace(built, problem=with_ramped_rates(built.problem))
-    program = (
-        shoot(built.problem, meshes, policy.points)
-        if policy.shooting
-        else transcribe(built.problem, meshes, policy.collocation)
-    )
+    program = transcribe(built.problem, policy.transcription.divided(meshes), policy.transcription)
     check_freedom(program)
     solver = Solver(program, replace(policy.solver, loops=bool(built.system.loops)))
     return Prepared(

@@ -1,20 +1,20 @@
 """How a problem is to be solved: the keywords of `optimize` as one record, checked when it is made."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, Literal, TypedDict
 
-import numpy as np
-
 from gantrytau import ModelError, Result
-from gantrytau.border.refusal import did_you_mean
+from gantrytau.border.checks import check_words, instance, number, whole
+from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau.compiler.system import Causality
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.solving.clock import Progress
 from gantrytau_optimica.solving.ipopt import SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of
-from gantrytau_optimica.transcription.scheme import Collocation, collocation
+from gantrytau_optimica.transcription.scheme import Collocation
+from gantrytau_optimica.transcription.transcribe import METHODS, MOST_POINTS, Scheme
 
 Guesses = Mapping[str, Any] | Result | Answer
 
@@ -24,7 +24,7 @@ class MeshKeywords(TypedDict, total=False):
 
     elements: int | Sequence[float]
     points: int
-    scheme: str
+    scheme: Scheme
     tolerance: float
     max_iterations: int
     max_time: float
@@ -53,7 +53,7 @@ class Policy:
 
     elements: int | Sequence[float] = 50
     points: int = 3
-    scheme: str = "radau"
+    scheme: Scheme = "radau"
     lengths: Literal["given", "free"] = "given"
     guess: Guesses | None = None
     controls: Mapping[str, Any] | None = None
@@ -66,33 +66,27 @@ class Policy:
     progress: Progress | None = None
 
     def __post_init__(self):
-        accuracy, told = self.refine, self.progress
-        for name, holds, expected in (
-            ("tolerance", isinstance(self.tolerance, float) and 0 < self.tolerance < 1, "a number between 0 and 1"),
-            ("max_iterations", _whole(self.max_iterations), "a whole number of at least 1"),
-            ("max_time", isinstance(self.max_time, (int, float)) and self.max_time > 0, "seconds above 0"),
-            ("progress", told is None or callable(told), "a function of (iteration, objective)"),
-            ("refine", accuracy is None or (isinstance(accuracy, float) and 1e-9 <= accuracy < 1),
-             "a relative accuracy from 1e-9 to below 1, as 1e-6"),
-            ("causality", self.causality in (None, "inverse", "forward"), "'inverse', 'forward' or None, the better one"),
-            ("starts", _whole(self.starts), "a whole number of at least 1"),
-            ("lengths", self.lengths in ("given", "free"),
-             "'given' or 'free' (the optimiser places the borders of the elements)"),
-        ):  # fmt: skip
-            if not holds:
-                raise ModelError(f"{name}={getattr(self, name)!r}: expected {expected}", argument=name)
-        if self.shooting and self.refine is not None:
-            said = "refine and scheme='shooting' do not go together; use scheme='radau' or 'gauss'"
-            raise ModelError(said, argument="refine")
-        if self.collocation.points.size == 1 and self._ramps:
-            said = "points=1 does not determine inputs that are ramps, as with refine=; expected at least 2 points"
-            raise ModelError(said, argument="points")
+        check_words(Policy, vars(self), "")
+        number("", "tolerance", self.tolerance, above=0.0, below=1.0)
+        number("", "max_time", self.max_time, above=0.0)
+        for name in ("max_iterations", "starts"):
+            whole("", name, getattr(self, name), least=1)
+        whole("", "points", self.points, least=METHODS[self.scheme].least, most=MOST_POINTS)
+        if self.refine is not None:
+            number("", "refine", self.refine, least=1e-9, below=1.0)
+        if self.progress is not None:
+            instance("", "progress", self.progress, Callable, "a function of (iteration, objective)")
+        scheme = Given("scheme", self.scheme)
+        for found in (Given("refine", self.refine), Given("lengths", self.lengths)):
+            if found.value not in (None, "given") and not self.transcription.refinable:
+                raise ModelError(
+                    scheme, " has inputs in pieces of whole elements, expected another one", found=found
+                )
+        if self.points == 1 and self._ramps:
+            raise ModelError(
+                "at least 2, as it does not determine inputs that are ramps", found=Given("points", 1)
+            )
         self.mesh  # noqa: B018 - refuses what is no mesh
-
-    @property
-    def shooting(self) -> bool:
-        """Whether elements have steps instead of collocation points."""
-        return self.scheme == "shooting"
 
     @property
     def _ramps(self) -> bool:
@@ -101,9 +95,9 @@ class Policy:
         return self.refine is not None or any(one in ("ramps", {"kind": "ramps"}) for one in wanted)
 
     @cached_property
-    def collocation(self) -> Collocation:
-        """Points and weights in every element."""
-        return collocation("radau" if self.shooting else self.scheme, self.points)
+    def transcription(self) -> Collocation:
+        """Points and weights in every element, and what may be done with the program."""
+        return METHODS[self.scheme].scheme(self.points)
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -128,8 +122,7 @@ def policy_of(verb: str, kind: type, keywords: Mapping[str, Any]) -> Policy:
             raise TypeError(
                 f"{verb}() got an unexpected keyword argument '{name}'{did_you_mean(name, kind.__annotations__)}"
             )
-    return Policy(**keywords)
-
-
-def _whole(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, (int, np.integer)) and bool(value >= 1)
+    try:
+        return Policy(**keywords)
+    except ModelError as error:
+        raise error.within(verb) from None

@@ -30,7 +30,6 @@ from gantrytau import (
     mod,
     pre,
     sign,
-    sin,
     sqrt,
     translate,
     when,
@@ -38,24 +37,13 @@ from gantrytau import (
 from gantrytau.answers.c_code import c_source
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
+from tests.answers.test_linearization import Kepler
 
-FORCES = [f"carts[{i}].f" for i in range(3)]
+CARTS, FORCES = ([f"carts[{i}].{letter}" for i in range(3)] for letter in "sf")
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 compiled_only = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 MOTION = ([0.5, 3.0, -0.6], [0.3, -0.2, 0.1], [1.0, 2.0, -1.0])
 ROUNDING = 1e-14  # relative: the compiler may contract products and sums
-
-
-class Kepler(Model):
-    """M = E - e sin E has no closed form; f pushes E."""
-
-    E = Real(unit="rad", description="eccentric anomaly", start=0.5)
-    M = Real(unit="rad", description="mean anomaly")
-    w = Input(unit="rad/s", description="rate of the mean anomaly", start=1.0)
-
-    def equations(self):
-        yield der(self.M) == self.w
-        yield self.M == self.E - 0.3 * sin(self.E)
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +54,8 @@ def inverse_dynamics():
 @pytest.fixture(scope="module")
 def anomaly():
     found = translate(Kepler()).function(["M"], ["E"])
-    assert any(
-        f.class_name() == "FastNewton" for f in found.find_functions()
-    )  # else the test is about nothing
+    # else the test is about nothing
+    assert any(f.class_name() == "FastNewton" for f in found.find_functions())
     return found
 
 
@@ -76,16 +63,10 @@ def load(source, folder, *names):
     """The functions of a C source, compiled as strict C99 without warnings of missing or wrong things."""
     path, library = folder / "code.c", folder / "code.so"
     path.write_text(source)
-    command = [
-        COMPILER,
-        "-std=c99",
-        "-pedantic",
-        "-Werror=implicit-function-declaration",
-        "-O0",  # rounds as -O1 does
-        "-shared",
-        "-fPIC",
-    ]
-    subprocess.run([*command, "-o", str(library), str(path), "-lm"], check=True, timeout=120)
+    flags = (
+        "-std=c99 -pedantic -Werror=implicit-function-declaration -O0 -shared -fPIC"  # -O0 rounds as -O1 does
+    )
+    subprocess.run([COMPILER, *flags.split(), "-o", library, path, "-lm"], check=True, timeout=120)
     return [ca.external(name, str(library)) for name in names]
 
 
@@ -103,26 +84,16 @@ def test_compiled_function_and_derivatives_equal_casadi(inverse_dynamics, tmp_pa
     expected = inverse_dynamics(*MOTION)
     assert error(value(*MOTION), expected) <= ROUNDING
     assert error(jacobian(*MOTION, *expected), inverse_dynamics.jacobian()(*MOTION, *expected)) <= ROUNDING
-    seeds = [[0.1, 0.2, 0.3], [1.0, 0.0, -1.0], [0.5, 0.5, 0.5]]
-    assert (
-        error(
-            [forward(*MOTION, *expected, *seeds)[i] for i in range(3)],
-            inverse_dynamics.forward(1)(*MOTION, *expected, *seeds),
-        )
-        <= ROUNDING
-    )
-    seeds = [ca.DM([[1.0, 2.0]]), ca.DM([[0.0, 1.0]]), ca.DM([[3.0, 0.0]])]
-    assert (
-        error(reverse(*MOTION, *expected, *seeds), inverse_dynamics.reverse(2)(*MOTION, *expected, *seeds))
-        <= ROUNDING
-    )
+    at = (*MOTION, *expected, [0.1, 0.2, 0.3], [1.0, 0.0, -1.0], [0.5, 0.5, 0.5])
+    assert error([forward(*at)[i] for i in range(3)], inverse_dynamics.forward(1)(*at)) <= ROUNDING
+    at = (*MOTION, *expected, ca.DM([[1.0, 2.0]]), ca.DM([[0.0, 1.0]]), ca.DM([[3.0, 0.0]]))
+    assert error(reverse(*at), inverse_dynamics.reverse(2)(*at)) <= ROUNDING
 
 
 @compiled_only
 def test_newton_iterations_are_written_in_c(anomaly, tmp_path):
-    value, jacobian = load(
-        c_source(anomaly, name="anomaly", jacobian=True), tmp_path, "anomaly", "jac_anomaly"
-    )
+    source = c_source(anomaly, name="anomaly", jacobian=True)
+    value, jacobian = load(source, tmp_path, "anomaly", "jac_anomaly")
     for E in (0.1, 1.0, 2.5):
         M = E - 0.3 * np.sin(E)
         # Newton's method stops at a residual of 1e-13, the slope of the equation is at least 0.7
@@ -132,26 +103,17 @@ def test_newton_iterations_are_written_in_c(anomaly, tmp_path):
 
 @compiled_only
 def test_functions_of_a_mechanism_compile(tmp_path):
-    mechanism = extract_mechanism(
-        GantryTau(prototypes.L1), tool="tool.r", joints=[f"carts[{i}].s" for i in range(3)], forces=FORCES
-    )
+    mechanism = extract_mechanism(GantryTau(prototypes.L1), tool="tool.r", joints=CARTS, forces=FORCES)
     (masses,) = load(c_source(mechanism.M2, name="carts_inertia"), tmp_path, "carts_inertia")
-    assert (
-        error([masses([0.5, 3.0, -0.6], [0.1, 0.2, 0.3])], [mechanism.M2([0.5, 3.0, -0.6], [0.1, 0.2, 0.3])])
-        <= ROUNDING
-    )
+    at = [0.5, 3.0, -0.6], [0.1, 0.2, 0.3]
+    assert error([masses(*at)], [mechanism.M2(*at)]) <= ROUNDING
 
 
 @compiled_only
 def test_iterations_and_linear_systems_of_the_six_link_robot_compile(tmp_path):
-    mechanism = extract_mechanism(
-        SixLinkGantryTau(prototypes.L1),
-        tool="tool.r",
-        joints=[f"carts[{i}].s" for i in range(3)],
-        forces=FORCES,
-    )
+    mechanism = extract_mechanism(SixLinkGantryTau(prototypes.L1), tool="tool.r", joints=CARTS, forces=FORCES)
     pose = [0.5, 3.0, -0.6]
-    q = translate(GantryTau(prototypes.L1)).function(["tool.r"], [f"carts[{i}].s" for i in range(3)])(pose)
+    q = translate(GantryTau(prototypes.L1)).function(["tool.r"], CARTS)(pose)
     (speeds,) = load(c_source(mechanism.velocity_jacobian, name="speeds"), tmp_path, "speeds")
     at = pose, ca.vertcat(*q)
     found, expected = np.array(speeds(*at)), np.array(mechanism.velocity_jacobian(*at))
@@ -169,9 +131,8 @@ class Switches(Model):
 
     def equations(self):
         a, b = self.a, self.b
-        yield self.y[0] == if_else(
-            a < b, sqrt(b - a), a - b
-        )  # a root that is not real where it is not asked for
+        # a root that is not real where it is not asked for
+        yield self.y[0] == if_else(a < b, sqrt(b - a), a - b)
         yield self.y[1] == fabs(a) + sign(b)
         yield self.y[2] == fmin(a, b) - fmax(a, 2 * b)
         yield self.y[3] == floor(a) + 10 * ceil(b)
@@ -187,9 +148,8 @@ class Switches(Model):
 def test_what_switches_does_so_in_c_at_the_border_too(tmp_path):
     names = [*(f"y[{k}]" for k in range(9)), "i"]
     function = translate(Switches()).function(["a", "b"], names)
-    value, jacobian = load(
-        c_source(function, name="switches", jacobian=True), tmp_path, "switches", "jac_switches"
-    )
+    source = c_source(function, name="switches", jacobian=True)
+    value, jacobian = load(source, tmp_path, "switches", "jac_switches")
     points = [-2.1, -1.0, -0.7, 0.0, 0.35, 0.7, 1.0, 1.4, 2.0]
     for a in points:
         for b in points:
@@ -244,13 +204,11 @@ def test_names_that_c_does_not_allow_are_refused(inverse_dynamics, name):
         c_source(inverse_dynamics, name=name)
 
 
-def test_numbers_of_names_and_directions_are_checked(inverse_dynamics):
-    with pytest.raises(ModelError, match=r"found given=\['tool.r'\], expected a list of 3 names"):
-        c_source(inverse_dynamics, given=["tool.r"])
-    with pytest.raises(ModelError, match="found find='carts', expected a list of 3 names"):
-        c_source(inverse_dynamics, find="carts")
-    with pytest.raises(ModelError, match="found forward=-1, expected a number of directions"):
-        c_source(inverse_dynamics, forward=-1)
+@pytest.mark.parametrize("wrong", [dict(given=["tool.r"]), dict(find="carts"), dict(forward=-1)])
+def test_numbers_of_names_and_directions_are_checked(inverse_dynamics, wrong):
+    with pytest.raises(ModelError) as refused:
+        c_source(inverse_dynamics, **wrong)
+    assert [refused.value.argument] == list(wrong)
 
 
 def test_functions_without_c_code_are_refused():

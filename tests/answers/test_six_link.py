@@ -9,9 +9,7 @@ from gantrytau import extract_mechanism, linearize, translate
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
 
-CARTS = [f"carts[{i}].s" for i in range(3)]
-SPEEDS = [f"carts[{i}].v" for i in range(3)]
-FORCES = [f"carts[{i}].f" for i in range(3)]
+CARTS, SPEEDS, FORCES = ([f"carts[{i}].{letter}" for i in range(3)] for letter in "svf")
 POSES = [[0.5, 3.0, -0.6], [0.85, 2.98, -0.63], [1.2, 2.7, -0.3]]
 # the orientation is iterated to 1e-13, speeds and forces follow from it by linear equations; forces of the largest
 NEAR = {"constraints": 1e-11, "speeds": 1e-10, "forces": 1e-9, "accelerations": 1e-9}
@@ -51,9 +49,8 @@ def test_parallel_links_are_the_three_link_robot():
         for name in ("velocity_jacobian", "M1", "M2", "G"):
             expected = numbers(getattr(peer, name), pose, q)
             # the orientation is iterated to 1e-13, and inertias are ratios of forces
-            assert (
-                np.abs(numbers(getattr(six, name), pose, q) - expected).max() < 1e-10 * np.abs(expected).max()
-            )
+            off = np.abs(numbers(getattr(six, name), pose, q) - expected).max()
+            assert off < 1e-10 * np.abs(expected).max()
 
 
 def imbalance(dae, mechanism, pose):

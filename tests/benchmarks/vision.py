@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.kinematics.rotations import of_vector, rotation_vector
+from gantrytau_optimica.fitting.blocks import minimised
 from gantrytau_optimica.vision import (
     Detections,
     Light,
@@ -20,7 +21,6 @@ from gantrytau_optimica.vision import (
 )
 from gantrytau_optimica.vision.reconstruction.adjustment import started
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State, TakenAsKnown
-from gantrytau_optimica.vision.reconstruction.schur import minimised
 from tests.benchmarks.table import Row, at_least, at_most
 from tests.optimica.vision.camera_rig import LENS, MIDDLE, SIDE, TYPICAL, lines, pair, scene, seen, views
 

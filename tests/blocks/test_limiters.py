@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, Input, Model, ModelError, connect, simulate, sin, translate
+from gantrytau import Fixed, Input, Model, ModelError, simulate, sin, translate
 from gantrytau.blocks import DeadZone, Hysteresis, Integrator, Limiter, RateLimiter, Step
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -15,14 +16,7 @@ NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some
 def bent(block, signal, stop=1.0, points=2):
     """Result of a signal through a block and an integrator."""
 
-    class Bent(Model):
-        signal = Input()
-        block = Limiter()
-        memory = Integrator()
-
-        def equations(self):
-            yield connect(self.signal, self.block.u)
-            yield connect(self.block.y, self.memory.u)
+    Bent = in_a_row("Bent", signal=Input(), block=Limiter(), memory=Integrator())
 
     model = type("Bent", (Bent,), {"block": block})()
     return simulate(model, stop=stop, inputs={"signal": signal}, tolerance=TOLERANCE, points=points)
@@ -67,12 +61,11 @@ def test_a_dead_zone_ends_at_exact_times():
 
 
 def test_a_rate_limiter_rises_and_falls_at_its_rates():
-    class Followed(Model):
-        step = Step(height=2.0, start_time=0.1)
-        limiter = RateLimiter(rising=4.0, falling=-1.0, T=1e-3)
-
-        def equations(self):
-            yield connect(self.step.y, self.limiter.u)
+    Followed = in_a_row(
+        "Followed",
+        step=Step(height=2.0, start_time=0.1),
+        limiter=RateLimiter(rising=4.0, falling=-1.0, T=1e-3),
+    )
 
     found = simulate(Followed(), stop=1.0, tolerance=TOLERANCE, points=1001)
     t, y = found.time, found["limiter.y"]
@@ -109,8 +102,7 @@ class Relay(Model):
     memory = Integrator(y=Fixed(0.0))
 
     def equations(self):
-        yield connect(self.relay.y, self.memory.u)
-        yield connect(self.memory.y, self.relay.u)
+        yield from row(self.relay, self.memory, self.relay)
 
 
 @pytest.mark.parametrize("points", [2, 1001])

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gantrytau import Fixed, Model, ModelError, connect, simulate, sin, translate
+from gantrytau import Fixed, Model, ModelError, simulate, sin, translate
 from gantrytau.blocks import Delay, Integrator, Ramp, Table1, Table2
+from tests.mechanisms.rows import in_a_row, row
 
 XS, YS = [-1.0, 0.0, 0.5, 2.0, 3.0], [2.0, -1.0, 0.0, 4.0, 1.0]
 
@@ -37,12 +38,7 @@ def test_a_table_of_two_arguments():
 
 
 def test_the_kinks_of_a_table_are_exact_in_time():
-    class Looked(Model):
-        ramp, table, memory = Ramp(height=4.0, offset=-1.0), Table1(XS, YS), Integrator()
-
-        def equations(self):
-            yield connect(self.ramp.y, self.table.u)
-            yield connect(self.table.y, self.memory.u)
+    Looked = in_a_row("Looked", ramp=Ramp(height=4.0, offset=-1.0), table=Table1(XS, YS), memory=Integrator())
 
     found = simulate(Looked(), stop=1.0, points=2, tolerance=1e-10)
     assert found.final("memory.y") == pytest.approx(np.trapezoid(YS, XS) / 4.0, abs=1e-8)
@@ -51,9 +47,9 @@ def test_the_kinks_of_a_table_are_exact_in_time():
 def test_wrong_tables():
     for block, words in (
         (Table1([0.0, 0.0], [1.0, 2.0]), r"Table1\), equation 1: table: .*rise"),
-        (Table1([0.0, 1.0], [1.0, 2.0, 3.0]), r"found 2 numbers xs and ys of shape \(3,\)"),
-        (Table1(XS, YS, kind="cubic"), "found kind='cubic', expected one of 'linear', 'spline'"),
-        (Table2([0.0, 1.0], [0.0, 1.0], [[1.0, 2.0]]), r"found values of shape \(1, 2\), expected \(2, 2\)"),
+        (Table1([0.0, 1.0], [1.0, 2.0, 3.0]), "found ys of 3"),
+        (Table1(XS, YS, kind="cubic"), "found kind='cubic'"),
+        (Table2([0.0, 1.0], [0.0, 1.0], [[1.0, 2.0]]), "found values of"),
     ):
         with pytest.raises(ModelError, match=words):
             translate(block)
@@ -72,8 +68,7 @@ def test_an_integrator_fed_back_with_a_delay_follows_its_polynomials():
         memory, past = Integrator(k=-1.0, y=Fixed(1.0)), Delay(T=1.0)
 
         def equations(self):
-            yield connect(self.memory.y, self.past.u)
-            yield connect(self.past.y, self.memory.u)
+            yield from row(self.memory, self.past, self.memory)
 
     found = simulate(Oscillator(), stop=2.0, tolerance=1e-10)
     t = found.time

@@ -7,6 +7,7 @@ import pytest
 
 from gantrytau import Input, Model, ModelError, connect, linearize, simulate, translate
 from gantrytau.blocks import FirstOrder, Integrator, Limiter, Pid, RateLimiter, Step
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -33,8 +34,7 @@ class Loop(Model):
 
     def equations(self):
         yield connect(self.step.y, self.pid.u_s)
-        yield connect(self.pid.y, self.plant.u)
-        yield connect(self.plant.y, self.pid.u_m)
+        yield from row(self.pid, self.plant, self.pid.u_m)
 
 
 @pytest.mark.parametrize("kind", ["P", "PI", "PD", "PID"])
@@ -114,8 +114,7 @@ def test_a_controller_without_its_derivative_holds_an_integrator():
 
         def equations(self):
             yield connect(self.target.y, self.pid.u_s)
-            yield connect(self.pid.y, self.plant.u)
-            yield connect(self.plant.y, self.pid.u_m)
+            yield from row(self.pid, self.plant, self.pid.u_m)
 
     poles = linearize(Position(), inputs=[], outputs=["plant.y"]).poles
     # slow pole of s (1 + k T_d) + k = 0, to first order in 1 / N

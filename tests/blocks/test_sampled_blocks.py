@@ -32,6 +32,7 @@ from gantrytau.blocks import (
     Step,
 )
 from gantrytau.electrical import Ground, Inductor, Resistor, VoltageSource
+from tests.mechanisms.rows import in_a_row, row
 
 signal: Any = scipy.signal  # most of it is made at run time, out of sight of type checkers
 PERIOD = 0.02
@@ -95,8 +96,7 @@ class Loop(Model):
 
     def equations(self):
         yield connect(self.wanted, self.pid.u_s)
-        yield connect(self.pid.y, self.plant.u)
-        yield connect(self.plant.y, self.pid.u_m)
+        yield from row(self.pid, self.plant, self.pid.u_m)
 
 
 def reference_loop(kind, limits, count, k=3.0, T_i=0.5, T_d=0.2, N=8.0, b=0.7, c=0.3):
@@ -164,8 +164,7 @@ def test_a_block_behind_another_is_a_period_behind():
         source = Sine(frequency=3.0)
 
         def equations(self):
-            yield connect(self.source.y, self.first.u)
-            yield connect(self.first.y, self.second.u)
+            yield from row(self.source, self.first, self.second)
 
     found = simulate(Row(), stop=1.0)
     for t in (0.13, 0.55, 0.99):
@@ -228,11 +227,8 @@ def test_pulses_of_a_width_make_the_ripple_of_a_winding(duty):
         resistor, inductor = Resistor(R=2.0), Inductor(L=1e-3, i=Fixed(0.0))
 
         def equations(self):
-            yield connect(self.duty, self.pulses.u)
-            yield connect(self.pulses.y, self.source.v)
-            yield connect(self.source.pin_a, self.resistor.pin_a)
-            yield connect(self.resistor.pin_b, self.inductor.pin_a)
-            yield connect(self.inductor.pin_b, self.source.pin_b)
+            yield from row(self.duty, self.pulses, self.source.v)
+            yield from row(self.source.pin_a, self.resistor, self.inductor, self.source.pin_b)
             yield connect(self.source.pin_b, self.ground.pin)
 
     found = simulate(Chopped(), stop=0.02, inputs={"duty": duty}, points=201, tolerance=1e-10)
@@ -245,12 +241,7 @@ def test_pulses_of_a_width_make_the_ripple_of_a_winding(duty):
 
 
 def test_a_step_at_an_instant_is_seen_at_the_next():
-    class Switched(Model):
-        step = Step(start_time=5 * PERIOD)
-        hold = SampleHold(period=PERIOD)
-
-        def equations(self):
-            yield connect(self.step.y, self.hold.u)
+    Switched = in_a_row("Switched", step=Step(start_time=5 * PERIOD), hold=SampleHold(period=PERIOD))
 
     found = simulate(Switched(), stop=0.2)
     assert found.at(4.5 * PERIOD, "hold.y") == 0.0

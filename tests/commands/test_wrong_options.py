@@ -6,27 +6,24 @@ import pytest
 
 SIMULATE = ("simulate", "Pendulum", "--stop", "0.1")
 PYTHON = re.compile(
-    r"\bNone\b|Traceback|help\(|positional|keyword|\bdict\b|b'|TypeError|ValueError|parse string"
+    r"\bNone\b|Traceback|help\(|positional|keyword|\bdict\b|b'|TypeError|ValueError|Value error|parse string"
 )
 WRONG = {  # a command and an option with its value -> what is said
     (*SIMULATE, "--input", "u=prbs(1)"): "expected prbs(bits, hold, amplitude=1.0, seed), with at least bits and hold",
     (*SIMULATE, "--input", "u=chirp(low='a')"): "expected chirp(low, high, duration,",
-    (*SIMULATE, "--input", "u=chirp(1, 2, 3, nosuch=4)"): "expected chirp(low, high, duration,",
     (*SIMULATE, "--input", "u=3"): "--input u: Pendulum has no variable or parameter 'u'",
     (*SIMULATE, "--outputs", "x,zz"): "--outputs zz: Pendulum has no variable or parameter 'zz'",
     (*SIMULATE, "--plot", "zz", "--to", "a.png"): "--plot zz: Pendulum has no variable or parameter 'zz'",
-    (*SIMULATE, "--seed", "-1"): "--seed -1: expected a whole number from 0 on",
+    (*SIMULATE, "--seed", "-1"): "--seed",
+    (*SIMULATE, "--points", "1"): "--points",
     (*SIMULATE, "--points", "1.5"): "'--points': expected a whole number",
     (*SIMULATE, "--tolerance", "x"): "'--tolerance': expected a number, as 0.5",
+    (*SIMULATE, "--limits", "end"): "'--limits': 'end' is not one of 'warn', 'stop', 'none'.",
     ("view", "Pendulum", "--pose", "zz=1"): "--pose zz: Pendulum has no variable or parameter 'zz'",
-    ("view", "Pendulum", "--output", "a.txt"): "--output a.txt: found the suffix '.txt', expected .html",
-    ("equations", "Pendulum", "--format", "htlm"): "--format htlm: found no such format; did you mean 'html'?",
+    ("equations", "Pendulum", "--format", "htlm"): "'--format': 'htlm' is not one of",
     ("equations", "Pendulum", "--given", "zz"): "--given zz: Pendulum has no variable or parameter 'zz'",
-    ("equations", "Pendulum", "--find", "zz"): "--find zz: Pendulum has no variable or parameter 'zz'",
-    ("equations", "Pendulum", "--reverse", "-1"): "'--reverse': expected at least 0",
-    ("fmu", "export", "Pendulum", "--given", "zz"): "--given zz: Pendulum has no variable or parameter 'zz'",
-    ("fmu", "export", "Pendulum", "--find", "zz"): "--find zz: Pendulum has no variable or parameter 'zz'",
     ("fmu", "export", "Pendulum", "--states", "zz"): "--states zz: Pendulum has no variable or parameter 'zz'",
+    ("fmu", "export", "Pendulum", "--solver", "rodas"): "'--solver': 'rodas' is not one of",
 }  # fmt: skip
 
 

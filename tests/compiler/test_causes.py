@@ -115,19 +115,13 @@ def test_an_input_that_is_driven_twice():
     twice = loop(lambda m: iter([m.axis.tau == -m.k * m.axis.rotor.w, m.axis.tau == 2.0]))
     message = refused(twice)
     assert "axis.tau, an input, is driven more than once" in message
-    assert (
-        "`axis.tau == (-(k*axis.rotor.w))` and by the model (Driven), equation 2 `axis.tau == 2`" in message
-    )
+    assert "`axis.tau == (-(k*axis.rotor.w))` and by the model (Driven), equation 2" in message
     bound = type("Bound", (Loop,), {"axis": Axis(tau=2.0), "drive": lambda m: iter([m.axis.tau == 1.0])})()
     assert "axis.tau, an input, is driven more than once" in refused(bound)
 
 
 def test_more_is_given_than_can_be_chosen():
-    message = refused(Axis(), given=["tau", "rotor.w"])
-    assert (
-        "More is given than can be chosen; leave out rotor.w or tau" in message
-        or "leave out rotor.w" in message
-    )
+    assert "More is given than can be chosen; leave out rotor.w" in refused(Axis(), given=["tau", "rotor.w"])
     assert "leave out rotor.phi or rotor.w" in refused(Axis(), given=["rotor.w", "rotor.phi"])
     assert translate(Axis(), given=["rotor.w"]).known == ("rotor.w",)
 

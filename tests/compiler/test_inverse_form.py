@@ -32,13 +32,10 @@ def rates(dae, causality, forces):
     p = np.array([dae.parameter_values[n] for n in system.parameters])
     near = np.array([dae.start.get(s.name(), 1.0) for s in system.z.elements()])
     arguments = ca.vertcat(system.x, system.u, system.p)
-    solver = ca.rootfinder(
-        "z", "newton", {"x": system.z, "p": arguments, "g": system.residuals}, {"abstol": 1e-11}
-    )
-    z = solver(near, np.concatenate([x, forces, p]))
-    return np.array(
-        ca.Function("ode", [system.z, arguments], [system.ode])(z, np.concatenate([x, forces, p]))
-    ).ravel()
+    equations = {"x": system.z, "p": arguments, "g": system.residuals}
+    at = np.concatenate([x, forces, p])
+    z = ca.rootfinder("z", "newton", equations, {"abstol": 1e-11})(near, at)
+    return np.array(ca.Function("ode", [system.z, arguments], [system.ode])(z, at)).ravel()
 
 
 @pytest.mark.parametrize("name", ROBOTS)

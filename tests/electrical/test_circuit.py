@@ -19,6 +19,7 @@ from gantrytau import (
     translate,
 )
 from gantrytau.electrical import Capacitor, CurrentSource, Ground, Inductor, Resistor, TwoPins, VoltageSource
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some time constants errors add up
@@ -81,8 +82,7 @@ class Bridge(Model):
             (self.upper_a, self.lower_a, self.middle.pin_a),
             (self.upper_b, self.lower_b, self.middle.pin_b),
         ):
-            yield connect(self.source.pin_a, upper.pin_a)
-            yield connect(upper.pin_b, lower.pin_a)
+            yield from row(self.source.pin_a, upper, lower)
             yield connect(upper.pin_b, end)
             yield connect(lower.pin_b, self.source.pin_b)
 
@@ -115,8 +115,7 @@ def test_capacitors_side_by_side_have_one_state():
         def equations(self):
             yield connect(self.source.pin_b, self.ground.pin)
             for capacitor in (self.one, self.other):
-                yield connect(self.source.pin_a, capacitor.pin_a)
-                yield connect(capacitor.pin_b, self.ground.pin)
+                yield from row(self.source.pin_a, capacitor, self.ground)
 
     dae = translate(Parallel())
     assert len(dae.states) == 1

@@ -6,6 +6,7 @@ import pytest
 from gantrytau import Fixed, Model, Real, connect, der, linearize, simulate, sin, translate
 from gantrytau.electrical import DcMotor, Ground, VoltageSource
 from gantrytau.mechanics import gears, rotational, translational
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some time constants errors add up
@@ -104,8 +105,7 @@ class Axis(Model):
         yield connect(self.source.pin_a, self.motor.pin_a)
         yield connect(self.source.pin_b, self.motor.pin_b)
         yield connect(self.source.pin_b, self.ground.pin)
-        yield connect(self.motor.flange, self.screw.flange_a)
-        yield connect(self.screw.flange_b, self.carriage.flange)
+        yield from row(self.motor.flange, self.screw, self.carriage)
 
 
 def test_a_carriage_on_a_ball_screw_is_an_inertia_on_the_shaft():

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from gantrytau import Array, Fixed, Model, Parameter, connect, if_else, simulate, sin
 from gantrytau.electrical import Capacitor, Ground, Resistor, TwoPins, VoltageSource
 from tests.families import first_of
+from tests.mechanisms.rows import row
 
 ON = 100.0  # S
 V = 10.0
@@ -36,11 +37,8 @@ class Rectifier(Model):
         for k in range(self.phases):
             if k:
                 yield connect(self.s[k].pin_b, self.s[0].pin_b)
-            yield connect(self.s[k].pin_a, self.r[k].pin_a)
-            yield connect(self.r[k].pin_b, self.D[k].pin_a)
-            yield connect(self.D[k].pin_b, plus)
-            yield connect(minus, self.D[self.phases + k].pin_a)
-            yield connect(self.D[self.phases + k].pin_b, self.r[k].pin_b)
+            yield from row(self.s[k].pin_a, self.r[k], self.D[k], plus)
+            yield from row(minus, self.D[self.phases + k], self.r[k].pin_b)
 
 
 class Smoothed(Rectifier):

@@ -86,9 +86,7 @@ def test_dask_starts_a_cluster_that_ends_with_the_study():
 
 def test_nobody_and_nobody_to_work_are_told(monkeypatch):
     monkeypatch.setattr(cluster, "PATIENCE", 1.0)
-    with pytest.raises(
-        ModelError, match=r"nobody answers at tcp://127\.0\.0\.1:9, expected a scheduler of Dask; start"
-    ):
+    with pytest.raises(ModelError, match=r"nobody answers at tcp://127\.0\.0\.1:9"):
         study(lambda x: x, over={"x": [1, 2]}, where="tcp://127.0.0.1:9")
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
         words = rf"the scheduler at {empty.scheduler_address} has no workers; start some by `dask worker"

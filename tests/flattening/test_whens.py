@@ -67,10 +67,7 @@ def test_records_of_a_ball():
     assert flat.discretes == flat.event_names == ("bounces",)
     assert [name for name, _ in one.reinits] == ["v"]
     assert [name for name, _ in one.assignments] == ["bounces"]
-    assert {leaf.name() for leaf in ca.symvar(one.reinits[0][1])} == {
-        "e",
-        "v",
-    }  # pre(v) is v, just before
+    assert {leaf.name() for leaf in ca.symvar(one.reinits[0][1])} == {"e", "v"}  # pre(v) is v, just before
     assert {leaf.name() for leaf in ca.symvar(one.assignments[0][1])} == {"pre(bounces)"}
     assert one.label == "the model (Ball), equation 3, when((h<=0))"
     dae = translate(Ball(), events=True)
@@ -113,150 +110,123 @@ def test_a_round_in_sorted_order(rose, acts, found):
     assert after == [acts, found]
 
 
-def test_a_circle_of_new_values_is_refused():
-    text = refused("when(self.h < 0, self.n == self.m, self.m == 1 - self.n)", n=Discrete(0), m=Discrete(0))
-    assert "n, m need each other's new values in a circle" in text or "m, n need" in text
-    assert "write pre(" in text
-    text = refused("when(self.h < 0, self.n == self.n + 1)", **COUNT)
-    assert "n needs its own new value" in text
-    assert "write pre(n)" in text
+CONDITIONS = {
+    "self.h": "found `h` as a condition of when, a number, expected a comparison, as x > 0",
+    "self.h + self.v * 2": "a number, expected a comparison",
+    "logic_and(self.h, self.v < 0)": "found `h` as a condition of when, a number",
+    "self.h == 0": "found the equation `(h==0)` as a condition of when, which h meets at single instants only",
+    "logic_or(self.v > 0, self.h == 0)": "found the equation `(h==0)`",
+    "ca.vertcat(self.h, self.v) < 0": "the condition of when has shape (2, 1), expected one number",
+    "True": "found True as the condition of when, which never changes",
+    "self.g > 0": "found `(0<g)` as the condition of when, which never changes",
+    "self.h < self.h": "which never changes",
+    "'h < 0'": "found str as the condition of when, expected a comparison",
+    "self.h < 0 and self.v < 0": "logic_and, logic_or, logic_not",
+    "self.h < self.v": "units disagree",
+}
 
 
-@pytest.mark.parametrize(
-    ("condition", "words"),
-    [
-        ("self.h", "found `h` as a condition of when, a number, expected a comparison, as x > 0"),
-        ("self.h + self.v * 2", "a number, expected a comparison"),
-        ("logic_and(self.h, self.v < 0)", "found `h` as a condition of when, a number"),
-        (
-            "self.h == 0",
-            "found the equation `(h==0)` as a condition of when, which h meets at single instants only",
-        ),
-        ("logic_or(self.v > 0, self.h == 0)", "found the equation `(h==0)`"),
-        ("ca.vertcat(self.h, self.v) < 0", "the condition of when has shape (2, 1), expected one number"),
-        ("True", "found True as the condition of when, which never changes"),
-        ("1 < 2", "found True as the condition of when, which never changes"),
-        ("self.g > 0", "found `(0<g)` as the condition of when, which never changes"),
-        ("self.h < self.h", "which never changes"),
-        ("'h < 0'", "found str as the condition of when, expected a comparison"),
-        ("self.h < 0 and self.v < 0", "logic_and, logic_or, logic_not"),
-        ("self.h < self.v", "units disagree"),
-    ],
-)
-def test_what_is_no_condition(condition, words):
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_what_is_no_condition(condition):
     text = refused(f"when({condition}, terminate('down'))")
-    assert words in text
+    assert CONDITIONS[condition] in text
     assert "the model (Faulty), equation 3" in text
 
 
-@pytest.mark.parametrize(
-    ("action", "words"),
-    [
-        ("", "found no action in when, expected reinit(...), discrete == ..., or terminate(...)"),
-        (
-            "reinit(self.g, 1.0)",
-            "found g, declared as parameter, expected a variable declared as Real or Output",
-        ),
-        ("reinit(self.n, 1.0)", "found reinit(n, ...), a Discrete, expected a state; write n == ..."),
-        ("reinit(der(self.v), 1.0)", "found reinit(der(v), ...), a derivative, expected a variable"),
-        ("reinit(2 * self.v, 1.0)", "reinit: found '(2.*v)', expected a variable"),
-        ("reinit(self.v, ca.SX([1, 2]))", "the value of reinit has shape (2, 1), expected (1, 1)"),
-        ("reinit(self.v, self.h), self.n == 1", "units disagree"),
-        (
-            "self.v == 0",
-            "with v on its left, expected a Discrete there; a state gets another value by reinit",
-        ),
-        ("pre(self.n) + 1 == self.n", "with `(pre(n)+1)` on its left, expected a Discrete there"),
-        ("when(self.v < 0, self.n == 1)", "found WhenChain as an action of when"),
-        ("terminate('')", "terminate: found '', expected a text"),
-        ("terminate(3)", "terminate: found 3, expected a text"),
-        ("self.n == 1, self.n == 2", "found two actions that set n in one when"),
-        ("self.n == pre(pre(self.n))", "found pre(n), a value just before, expected a variable"),
-        ("3", "found int, expected an equation"),
-    ],
-)
-def test_what_is_no_action(action, words):
-    text = refused(
-        f"when(self.h < 0, {action})", "when(self.h < -1, self.other == 1)", other=Discrete(0), **COUNT
-    )
-    assert words in text
+ACTIONS = {
+    "": "found no action in when, expected reinit(...), discrete == ..., or terminate(...)",
+    "reinit(self.g, 1.0)": "found g, declared as parameter, expected a variable declared as Real or Output",
+    "reinit(self.n, 1.0)": "found reinit(n, ...), a Discrete, expected a state; write n == ...",
+    "reinit(der(self.v), 1.0)": "found reinit(der(v), ...), a derivative, expected a variable",
+    "reinit(2 * self.v, 1.0)": "reinit: found '(2.*v)', expected a variable",
+    "reinit(self.v, ca.SX([1, 2]))": "the value of reinit has shape (2, 1), expected (1, 1)",
+    "reinit(self.v, self.h), self.n == 1": "units disagree",
+    "self.v == 0": "with v on its left, expected a Discrete there; a state gets another value by reinit",
+    "pre(self.n) + 1 == self.n": "with `(pre(n)+1)` on its left, expected a Discrete there",
+    "when(self.v < 0, self.n == 1)": "found WhenChain as an action of when",
+    "terminate('')": "terminate: found '', expected a text",
+    "self.n == 1, self.n == 2": "found two actions that set n in one when",
+    "self.n == pre(pre(self.n))": "found pre(n), a value just before, expected a variable",
+    "self.n == self.n + 1": "n needs its own new value, expected values that follow one after another; write pre(n)",
+    "3": "found int, expected an equation",
+}
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_what_is_no_action(action):
+    lines = (f"when(self.h < 0, {action})", "when(self.h < -1, self.other == 1)")
+    text = refused(*lines, other=Discrete(0), **COUNT)
+    assert ACTIONS[action] in text
     assert "equation 3" in text
 
 
-def test_two_whens_for_one_variable():
-    lines = ("when(self.h < 0, self.n == 1)", "when(self.v < 0, self.n == 2)")
-    text = refused(*lines, **COUNT)
-    assert (
-        "equation 4, when((v<0)): found n, which the model (Faulty), equation 3, when((h<0)) sets as well"
-        in text
-    )
-    assert "when(first, ...).elsewhen(second, ...)" in text
-    text = refused("when(self.h < 0, reinit(self.v, 1))", "when(self.v < 0, reinit(self.v, 2))")
-    assert "found v, which" in text
+SET = "when(self.h < 0, self.n == 1)"
+MEMBERS: dict[str, Any] = dict(
+    n=Discrete(0), m=Discrete(0), x=Real(), y=Real(), z=Real(unit="m"), w=Real(unit="m/s"), u=Input(start=0.0)
+)
+STATEMENTS = [  # names of MEMBERS, statements behind two equations, and what is said of them
+    (
+        "nm",
+        ["when(self.h < 0, self.n == self.m, self.m == 1 - self.n)"],
+        "need each other's new values in a circle",
+    ),
+    (
+        "n",
+        [SET, "when(self.v < 0, self.n == 2)"],
+        "4, when((v<0)): found n, which the model (Faulty), equation 3, when(",
+    ),
+    ("", ["when(self.h < 0, reinit(self.v, 1))", "when(self.v < 0, reinit(self.v, 2))"], "found v, which"),
+    ("n", [], "n: found a Discrete that no when sets"),
+    ("", ["self.h > 0"], "expected an equation"),
+    ("ny", ["self.y == der(self.n)", SET], "der(): found n, which jumps at instants"),
+    ("ny", ["self.y == der(self.h * self.n)", SET], "der(): found n"),
+    (
+        "nxy",
+        ["self.x == self.n * self.h", "self.y == der(self.x)", SET],
+        "n is a Discrete and jumps at instants",
+    ),
+    ("z", ["self.z == pre(self.h)"], "equation 3: found pre(h), expected it in when(...) only"),
+    ("z", ["sampled(self.z, pre(self.h), period=0.1)"], "found pre(h), expected it in when(...) only"),
+    (
+        "nz",
+        ["sampled(self.z, self.h, period=0.1)", "when(self.h < 0, self.n == pre(self.z))"],
+        "pre(z) of a sampled",
+    ),
+    (
+        "y",
+        ["self.y == 2 * self.h * self.v", "when(self.h < 0, reinit(self.y, 1))"],
+        "y is no state, as it follows",
+    ),
+    ("u", ["when(self.h < 0, reinit(self.u, 1))"], "found u, declared as input"),
+    (
+        "w",
+        [
+            "self.w == -2 * self.v",
+            "when(self.h < 0, reinit(self.w, 1))",
+            "when(self.h < -1, reinit(self.v, 1))",
+        ],
+        "found reinit(v, ...), but v is the same state as w, which a when sets as well",
+    ),
+]
+
+
+@pytest.mark.parametrize(("names", "lines", "words"), STATEMENTS)
+def test_what_cannot_be_stated_of_instants(names, lines, words):
+    assert words in refused(*lines, **{name: MEMBERS[name] for name in names})
+
+
+def test_what_can_be_stated_in_their_place():
     joined = falling("when(self.h < 0, self.n == 1).elsewhen(self.v < 0, self.n == 2)", **COUNT)
     assert [one.after for one in flatten(joined).whens] == [-1, 0]
-
-
-def test_a_discrete_is_set_by_whens_alone():
-    assert "n: found a Discrete that no when sets" in refused(**COUNT)
-    text = refused("self.n == self.h", "when(self.h < 0, self.n == 1)", kind=StructureError, **COUNT)
+    text = refused("self.n == self.h", SET, kind=StructureError, **COUNT)
     assert "n, a Discrete, counts as known" in text
-    assert "only actions of when set a Discrete" in text
-    text = refused("self.h > 0", kind=ModelError)
-    assert "expected an equation" in text
-    with pytest.raises(
-        ModelError, match=r"found the modification bounces=3, an equation.*bounces=Start\(3\)"
-    ):
+    with pytest.raises(ModelError, match=r"the modification bounces=3, an equation.*bounces=Start\(3\)"):
         translate(Ball(bounces=3), events=True)
     assert translate(Ball(bounces=Start(3)), events=True).start["bounces"] == 3
-
-
-def test_a_discrete_has_no_derivative():
-    text = refused("self.y == der(self.n)", "when(self.h < 0, self.n == 1)", y=Real(), **COUNT)
-    assert "der(): found n, which jumps at instants" in text
-    text = refused("self.y == der(self.h * self.n)", "when(self.h < 0, self.n == 1)", y=Real(), **COUNT)
-    assert "der(): found n" in text
-    lines = ("self.x == self.n * self.h", "self.y == der(self.x)", "when(self.h < 0, self.n == 1)")
-    text = refused(*lines, x=Real(), y=Real(), **COUNT)
-    assert "n is a Discrete and jumps at instants" in text
-    assert "differentiated" in text
-
-
-def test_values_before_belong_to_whens():
-    text = refused("self.y == pre(self.h)", y=Real(unit="m"))
-    assert "equation 3: found pre(h), expected it in when(...) only" in text
-    text = refused("sampled(self.y, pre(self.h), period=0.1)", y=Real(unit="m"))
-    assert "found pre(h), expected it in when(...) only" in text
-    lines = ("sampled(self.y, self.h, period=0.1)", "when(self.h < 0, self.n == pre(self.y))")
-    assert "found pre(y) of a sampled variable" in refused(*lines, y=Real(unit="m"), n=Discrete(0, unit="m"))
+    alias = falling("self.y == -2 * self.v", "when(self.h < 0, reinit(self.y, 1))", y=Real(unit="m/s"))
+    assert set(translate(alias, events=True).states) == {"h", "v"}
     with pytest.raises(ModelError, match="outside of equations"):
         pre(ca.SX.sym("x"))
-
-
-def test_only_states_are_set_anew():
-    lines = ("self.y == 2 * self.h * self.v", "when(self.h < 0, reinit(self.y, 1))")
-    text = refused(*lines, y=Real(unit="m2/s"))
-    assert "found reinit(y, ...), but y is no state" in text
-    assert "expected one of the states, h, v" in text
-    text = refused("when(self.h < 0, reinit(self.u, 1))", u=Input(start=0.0))
-    assert "found u, declared as input" in text
-    # an alias of a state will do
-    dae = translate(
-        falling("self.y == -2 * self.v", "when(self.h < 0, reinit(self.y, 1))", y=Real(unit="m/s")),
-        events=True,
-    )
-    assert set(dae.states) == {"h", "v"}
-
-
-def test_one_state_is_set_by_one_name():
-    lines = (
-        "self.y == -2 * self.v",
-        "when(self.h < 0, reinit(self.y, 1))",
-        "when(self.h < -1, reinit(self.v, 1))",
-    )
-    text = refused(*lines, y=Real(unit="m/s"))
-    assert "equation 5" in text
-    assert "found reinit(v, ...), but v is the same state as y, which a when sets as well" in text
 
 
 class Lever(Model):
@@ -319,9 +289,8 @@ def test_mod_and_limit():
     x = ca.SX.sym("x")
     values = [-7.5, -3.0, -0.5, 0.0, 2.0, 3.0, 8.25]
     up, down, held = (ca.Function("f", [x], [e]) for e in (mod(x, 3), mod(x, -3), limit(x, -1, 2)))
-    assert [float(up(v)) for v in values] == [
-        v % 3 for v in values
-    ]  # Python's sign is that of the divisor, too
+    # Python's sign is that of the divisor, too
+    assert [float(up(v)) for v in values] == [v % 3 for v in values]
     assert [float(down(v)) for v in values] == [v % -3 for v in values]
     assert [float(held(v)) for v in values] == [min(max(v, -1), 2) for v in values]
     assert limit(-5, -1, 2) == -1

@@ -10,7 +10,7 @@ from fmpy.model_description import read_model_description
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.model_description import build_description, model_description
 from gantrytau_fmu.description import (
-    Experiment,
+    DefaultExperiment,
     FmuDescription,
     FmuInterface,
     FmuTerminal,
@@ -66,7 +66,7 @@ def oscillator(**changes) -> FmuDescription:
                     "der(v)", ("m", "spring.c", "f", "s"), ("dependent", "dependent", "constant", "dependent")
                 ),
             ),
-            experiment=Experiment(0.5, 4.0, 1e-7, 0.002),
+            experiment=DefaultExperiment(0.5, 4.0, 1e-7, 0.002),
             description="A mass & a spring",
             author="A. Author",
             version="1.2",

@@ -1,15 +1,11 @@
 """Steps, sweeps and sums of sines against scipy and their definitions."""
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.signal import chirp as sweep
 
 from gantrytau import ModelError, chirp, multisine, steps
-
-SQUARE: Any = "square"
 
 
 def test_steps_are_zero_before_the_first_and_hold_the_last():
@@ -99,20 +95,12 @@ def test_samples_of_smooth_signals_are_near_them(signal):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: chirp(0.0, 1.0, 1.0), "chirp: found low=0.0, expected a number above zero, in Hz"),
-        (lambda: chirp(1.0, 2.0, -1.0), "chirp: found duration=-1.0, expected a number above zero, in s"),
-        (
-            lambda: chirp(1.0, 2.0, 1.0, kind=SQUARE),
-            "chirp: found kind='square', expected 'linear' or 'logarithmic'",
-        ),
-        (lambda: multisine([1.0, 1.0]), "found a frequency twice"),
-        (
-            lambda: multisine([1.0, -1.0]),
-            "multisine: found frequencies=[1.0, -1.0], expected numbers above zero",
-        ),
+        (lambda: chirp(0.0, 1.0, 1.0), "found low=0.0"),
+        (lambda: multisine([1.0, 1.0]), "expected one or several different ones"),
+        (lambda: multisine([1.0, -1.0]), "found frequencies[1] = -1.0"),
         (lambda: multisine([1.0, 2.0, 3.0], [1.0, 2.0]), "found 2 amplitudes, expected one, or 3"),
-        (lambda: multisine([1.0], phases="flat"), "found phases='flat', expected 'schroeder', 'random'"),
-        (lambda: multisine([1.0], phases=[1.0, 2.0]), "found phases of shape (2,), expected 1 finite angles"),
+        (lambda: multisine([1.0], phases="flat"), "found phases='flat', expected 'schroeder' or 'random'"),
+        (lambda: multisine([1.0], phases=[1.0, 2.0]), "found phases of 2"),
         (lambda: multisine([1.0], phases="random").values(0.0), "has no seed; give it one"),
         (lambda: steps([1.0, 0.5], [1.0, 2.0]), "the time falls from 1 s in row 0 to 0.5 s"),
         (lambda: chirp(1e6, 1e6, 1.0).samples(0.0, 1.0), "2.56e+08 of its values, expected at most 1e+07"),

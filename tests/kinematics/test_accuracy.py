@@ -179,33 +179,22 @@ def test_levels_are_drawn(tmp_path, quantity):
     ("call", "message"),
     [
         (lambda: accuracy(SixLinkGantryTau(prototypes.D1), [0, 0, 0], CASE_1), "found 6 links.*GantryTau"),
-        (lambda: accuracy(D1, [0, 0], CASE_1), r"found r of shape \(2,\), expected \(3,\) or \(N, 3\)"),
-        (lambda: accuracy(D1, [0, 0, 0], CASE_1[0]), "found semi_axes .* expected three rows"),
-        (lambda: accuracy(D1, [0, 0, 0], -CASE_1), "found semi_axes .* expected three rows"),
-        (lambda: accuracy(D1, [0, 0, 0], 1e6 * CASE_1), "found semi_axes .* expected three rows"),
-        (lambda: accuracy(D1, [0, 0, 0], "small"), "found semi_axes 'small', expected three rows"),
-        (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).sampled(0), "found samples=0, expected a whole number"),
-        (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).displaced(CASE_1), r"errors of shape \(3, 3\), expected"),
-        (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).plot("volume"), "found the quantity 'volume'"),
+        (lambda: accuracy(D1, [0, 0, 0], CASE_1[0]), "found semi_axes of 3"),
+        (lambda: accuracy(D1, [0, 0, 0], -CASE_1), "found semi_axes"),
+        (lambda: accuracy(D1, [0, 0, 0], 1e6 * CASE_1), "found semi_axes.*below a tenth of a link"),
+        (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).displaced(CASE_1), "found errors of 3 x 3"),
         (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).plot(axes="yy"), "found the axes 'yy'"),
         (lambda: accuracy(D1, [0, -4.3, 0], CASE_1).plot(), "found 1 poses in reach"),
         (lambda: accuracy(D1, slice_between_guideways(), CASE_1).plot(axes="xy"), "on one line of the xy"),
+        (
+            lambda: accuracy(Kinematics(StewartPlatform(), tool="platform"), [0, 0, 0], CASE_1),
+            "expected a Gantry-Tau",
+        ),
     ],
 )
 def test_what_cannot_be_answered_is_refused(call, message):
     with pytest.raises(ModelError, match=message):
         call()
-
-
-def test_another_model_has_no_links():
-    with pytest.raises(
-        ModelError, match=r"Kinematics.accuracy: found StewartPlatform, expected a Gantry-Tau"
-    ):
-        accuracy(
-            Kinematics(StewartPlatform(), tool="platform", joints=[f"legs[{k}].s" for k in range(6)]),
-            [0, 0, 0],
-            CASE_1,
-        )
 
 
 def test_a_model_and_its_kinematics_answer_alike_and_no_poses_are_no_rows():

@@ -115,9 +115,7 @@ def test_links_too_short_have_complex_modes_only():
 
 def test_similar_hexagons_are_refused():
     hexagon = circle(60 * np.arange(6), 1.0)
-    with pytest.raises(
-        StructureError, match=r"found 5 independent conditions of six links, expected 6.*move a joint"
-    ):
+    with pytest.raises(StructureError, match=r"found 5 independent conditions of six links"):
         assembly_modes(*assembled(hexagon, 0.5 * hexagon))
 
 
@@ -125,55 +123,29 @@ def test_similar_hexagons_are_refused():
 def test_joints_on_a_line_are_refused(name):
     hexapod = dict(zip(("base", "platform", "lengths"), random_hexapod(6), strict=True))
     hexapod[name] = np.linspace(0, 1, 6)[:, None] * [1.0, 2.0, 3.0] + 4.0
-    with pytest.raises(
-        StructureError, match=rf"found all joints of the {name} on one line.*move one of them"
-    ):
+    with pytest.raises(StructureError, match=rf"found all joints of the {name} on one line.*move one of"):
         assembly_modes(**hexapod)
-
-
-def test_joints_all_in_one_place_are_refused():
-    base, _, lengths = random_hexapod(6)
-    with pytest.raises(StructureError, match="all joints of the platform on one line"):
-        assembly_modes(base, np.ones((6, 3)), lengths)
 
 
 BASE, PLATFORM, LENGTHS = random_hexapod(7)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "argument"),
     [
-        (
-            (BASE[:5], PLATFORM, LENGTHS),
-            r"found base of shape \(5, 3\), expected six joints, \(6, 3\) in m; one hexapod",
-        ),
-        ((BASE, PLATFORM.T, LENGTHS), r"found platform of shape \(3, 6\), expected six joints"),
-        (
-            (BASE, PLATFORM, LENGTHS[None]),
-            r"found lengths of shape \(1, 6\), expected six lengths, \(6,\) in m",
-        ),
-        ((BASE, PLATFORM, ["a"] * 6), r"found lengths \['a'.*expected six lengths.*give numbers"),
-        ((BASE + 1j, PLATFORM, LENGTHS), "found base .*give numbers, not complex ones"),
-        (
-            (BASE * [1, 1, np.nan], PLATFORM, LENGTHS),
-            r"found base\[0\] = .*nan.*expected finite numbers in m; leave no",
-        ),
-        (
-            (BASE, PLATFORM, LENGTHS * [1, 1, 1, -1, 1, 1]),
-            r"found lengths\[3\] = -.*expected lengths above 0 m",
-        ),
+        ((BASE[:5], PLATFORM, LENGTHS), "base"),
+        ((BASE, PLATFORM.T, LENGTHS), "platform"),
+        ((BASE, PLATFORM, LENGTHS[None]), "lengths"),
+        ((BASE + 1j, PLATFORM, LENGTHS), "base"),
+        ((BASE * [1, 1, np.nan], PLATFORM, LENGTHS), "base"),
+        ((BASE, PLATFORM, LENGTHS * [1, 1, 1, -1, 1, 1]), "lengths"),
     ],
-    ids=["five", "transposed", "many", "text", "complex", "gap", "negative"],
+    ids=["five", "transposed", "many", "complex", "gap", "negative"],
 )
-def test_what_is_no_hexapod_is_refused(arguments, message):
-    with pytest.raises(ModelError, match=f"(?s)assembly_modes: {message}"):
+def test_what_is_no_hexapod_is_refused(arguments, argument):
+    with pytest.raises(ModelError) as refusal:
         assembly_modes(*arguments)
-
-
-@pytest.mark.parametrize("diameter", [-0.01, np.nan, np.inf, "thin"])
-def test_a_diameter_is_not_negative(diameter):
-    with pytest.raises(ModelError, match=r"found diameter .*, expected 0 or more, in m; leave it out"):
-        assembly_modes(BASE, PLATFORM, LENGTHS, diameter=diameter)
+    assert refusal.value.argument == argument
 
 
 def spoilt(monkeypatch: pytest.MonkeyPatch, spoil, times: int) -> list[float]:

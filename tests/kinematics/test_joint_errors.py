@@ -81,18 +81,12 @@ def test_a_platform_also_turns(tmp_path):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda d: accuracy(d, d.home.r, errors=[1e-4]), r"expected \(3,\), the largest of arms"),
+        (lambda d: accuracy(d, d.home.r, errors=[1e-4]), "found errors of 1"),
         (lambda d: accuracy(d, d.home.r, errors=-SMALL), "of at least 0"),
-        (
-            lambda d: accuracy(d, d.home.r, errors=np.full((3, 3), 1e-4)),
-            "ellipsoids .* for robots on three links",
-        ),
         (lambda d: ANYHOW(d, d.home.r), "found neither semi_axes and errors"),
         (lambda d: ANYHOW(d, d.home.r, np.eye(3), errors=SMALL), "found both semi_axes and errors"),
         (lambda d: accuracy(d, d.home.r, errors=SMALL).turn, "joints choose the position alone"),
-        (lambda d: accuracy(d, d.home.r, errors=SMALL).displaced([1.0]), "expected .k, 3., a row of errors"),
-        (lambda d: accuracy(d, d.home.r, errors=SMALL).sampled(0), "expected a whole number from 1"),
-        (lambda d: accuracy(d, d.home.r, errors=SMALL).plot("angle"), "expected 'error' or 'turn'"),
+        (lambda d: accuracy(d, d.home.r, errors=SMALL).displaced([1.0]), "found errors of 1"),
     ],
 )
 def test_what_cannot_be_answered_is_refused(delta, call, words):

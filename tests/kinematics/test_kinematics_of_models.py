@@ -13,6 +13,7 @@ from gantrytau.kinematics import Kinematics, assembly_modes
 from gantrytau.kinematics.rotations import turned
 from gantrytau.mechanics.multibody import Body, FixedTranslation, PointMass, Prismatic, Revolute, World
 from gantrytau_models import DeltaRobot, GantryTau, Pendulum, StewartPlatform, prototypes
+from tests.mechanisms.rows import row
 
 ALONG_X = np.array([1.0, 0.0, 0.0])
 
@@ -129,10 +130,7 @@ def test_the_equations_of_a_gantry_tau_answer_as_its_closed_form():
     [
         (lambda: Kinematics(StewartPlatform()), "has no 'tool.r', expected the position of a tool"),
         (lambda: Kinematics(Pendulum(), tool="body"), "has no 'body.r'"),
-        (
-            lambda: Kinematics(DeltaRobot(), joints=["arms[0].psi"]),
-            r"no variable or parameter 'arms\[0\].psi'",
-        ),
+        (lambda: Kinematics(DeltaRobot(), joints=["arms[0].psi"]), r"no variable or parameter"),
     ],
 )
 def test_models_without_what_is_needed(make, words):
@@ -182,9 +180,7 @@ def test_as_many_ways_to_move_as_joints():
     with pytest.raises(ModelError, match="found 2 joints and an orientation R for PlanarArm, expected none"):
         Kinematics(PlanarArm(), joints=["shoulder.phi", "elbow.phi"]).ik([0.3, 0.3, 0.0], np.eye(3))
     stretched = PlanarArm(elbow=dict(phi=Start(0.0)))
-    with pytest.raises(
-        ModelError, match="found 2 joints of PlanarArm, which move tool in 1 ways, expected as many"
-    ):
+    with pytest.raises(ModelError, match="found 2 joints of PlanarArm, which move tool in 1 ways"):
         Kinematics(stretched, joints=["shoulder.phi", "elbow.phi"]).ik([0.3, 0.3, 0.0])
 
 
@@ -202,8 +198,7 @@ def test_a_model_that_nothing_drives():
         x = Prismatic(n=[1.0, 0.0, 0.0])
 
         def equations(self):
-            yield connect(self.world.frame_b, self.x.frame_a)
-            yield connect(self.x.frame_b, self.tool.body.frame_a)
+            yield from row(self.world, self.x, self.tool.body)
 
     with pytest.raises(ModelError, match="has the inputs none, expected forces"):
         Kinematics(Loose())

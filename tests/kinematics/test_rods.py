@@ -102,14 +102,8 @@ def test_a_member_called_rods_says_nothing():
 @pytest.mark.parametrize(
     ("said", "message"),
     [
-        (
-            lambda self: ["low.length"],
-            r"Tripod\.rods: found \['low\.length'\], expected a record of names; return Rods",
-        ),
-        (
-            lambda self: Rods(arms_of(["low", "hihg", "far"])),
-            r"Tripod\.rods: found 'hihg\.offset', expected the name of a parameter .*did you mean 'high\.offset'",
-        ),
+        (lambda self: ["low.length"], r"Tripod\.rods: found \['low\.length'\], expected a record of names"),
+        (lambda self: Rods(arms_of(["low", "hihg", "far"])), r"Tripod\.rods: found 'hihg\.offset'"),
         (
             lambda self: Rods([RodArm("low", "low_cart.s", "low.direction", "low.offset", [SingleRod(2.0)])]),  # type: ignore
             r"rods: found SingleRod\.length = 2\.0, expected the name of a parameter",

@@ -172,9 +172,9 @@ def test_rates_of_robots_on_rods_and_of_six_joints():
     ("limits", "words"),
     [
         (dict(ball_joint=0.5), "found Limits.ball_joint of a robot that does not say by rods"),
-        (dict(strokes=[[0, 1]] * 2), r"expected \(3, 2\)"),
+        (dict(strokes=[[0, 1]] * 2), "found strokes of 2 x 2"),
         (dict(passive={"arms[0].phy": (0, 1)}), "no scalar variable 'arms.0..phy'; did you mean"),
-        (dict(passive={"arms[0].phi": (1, 0)}), r"found .* of arms.0..phi, expected \(least, largest\)"),
+        (dict(passive={"arms[0].phi": (1, 0)}), r"found passive=.*expected \(least, largest\)"),
         (dict(passive=NO_NAMES), "expected .* by name of a variable"),
     ],
 )
@@ -184,8 +184,6 @@ def test_limits_that_it_does_not_have_are_refused(delta, limits, words):
 
 
 def test_other_mistakes(delta):
-    with pytest.raises(ModelError, match="expected a ratio above 1"):
-        Limits(condition=0.5)
     with pytest.raises(ModelError, match="expected neither; limit its ball joints"):
         examine(GantryTau(prototypes.L1), [0.5, 3.0, -0.6], limits=Limits(condition=5.0))
     with pytest.raises(ModelError, match=r"give box=") as caught:

@@ -1,6 +1,7 @@
 """What may stand in equations(self), and what is said about the rest."""
 
 import math
+import re
 
 import casadi as ca
 import numpy as np
@@ -46,49 +47,39 @@ def plant(statement):
     return Bench()
 
 
-@pytest.mark.parametrize(
-    ("statement", "message"),
-    [
-        (lambda p: [p.x] == [p.y], r"Python's if, .* lists cannot work on symbols; use .* casadi\.vertcat"),
-        (
-            lambda p: p.r == [p.x, 0, 0],
-            r"found False, expected an equation .* casadi\.vertcat\(\.\.\.\) instead",
-        ),
-        (lambda p: True, r"found True, expected an equation"),
-        (lambda p: p.r == p.q, r"x is 3x1, while y is 2x1; the two operands have different shapes"),
-        (
-            lambda p: p.r == p.x,
-            r"found shapes \(3,\) and \(\) in 'r\[0\] == x'.* the same shape on both sides",
-        ),
-        (lambda p: p.x == p.r, r"found shapes \(3,\) and \(\)"),
-        (lambda p: p.r == 2 * p.x, r"found shapes \(3,\) and \(\)"),
-        (lambda p: p.x == p.x, r"both sides are the same, so it says nothing"),
-        (lambda p: ca.SX(1) == 2, r"both sides are constants that differ, so it can never hold"),
-        (lambda p: 3.0, r"found float, expected an equation `a == b` or connect"),
-        (lambda p: None, r"found NoneType, expected an equation"),
-        (lambda p: p.x + 1, r"found '\(x\+1\)', expected an equation; write `a == b`"),
-        (lambda p: p.x < 1, r"found '\(x<1\)', expected an equation"),
-        (lambda p: between(0, p.x, 1), r"found Between, expected an equation"),
-        (lambda p: (p.x if p.x > 0 else p.y) == 0, r"truth value .* use if_else, between"),
-        (lambda p: (p.x > 0 and p.y > 0) == 0, r"truth value .* use if_else, between"),
-        (lambda p: 0 < p.x < 1, r"truth value .* chained comparisons .* use if_else, between"),
-        (lambda p: p.x == p.y == p.length, r"truth value .* chained comparisons"),
-        (lambda p: p.x == max(p.y, 0), r"truth value .* casadi\.fmax"),
-        (lambda p: p.x == math.sin(p.y), r"found nan in `x == nan`.* module math .* use those of gantrytau"),
-        (lambda p: p.x == p.velocty, r"Bench has no 'velocty'; did you mean 'velocity'\?"),
-        (lambda p: p.x == p.y.squared, r"SX has no 'squared'"),
-        (lambda p: p.x == ca.sinus(p.y), r"casadi has no 'sinus'; did you mean"),
-        (
-            lambda p: ca.sin([p.x, p.y]) == 0,
-            r"no number or expression among symbols; join lists with casadi\.vertcat",
-        ),
-        (lambda p: p.r + p.q == 0, r"x is 3x1, while y is 2x1"),
-        (lambda p: ca.cross(p.q, p.r) == 0, r"Dimension of a \(2x1 \) must equal that of b \(3x1\)"),
-        (lambda p: p.r[3] == 0, r"out of bounds with supplied length of 3"),
-    ],
-)
-def test_what_is_no_equation_is_refused_with_its_place(statement, message):
-    with pytest.raises(ModelError, match=r"^the model \(Bench\), equation 2: .*" + message):
+NO_EQUATIONS = [  # statements, and what is said of them
+    (lambda p: [p.x] == [p.y], "Python's if, and, or, max, chained comparisons and lists cannot work"),
+    (lambda p: p.r == [p.x, 0, 0], "Join symbols with casadi.vertcat(...) instead"),
+    (lambda p: True, "found True, expected an equation"),
+    (lambda p: p.r == p.q, "x is 3x1, while y is 2x1; the two operands have different shapes"),
+    (lambda p: p.r == p.x, "found shapes (3,) and () in 'r[0] == x' and the rows below"),
+    (lambda p: p.x == p.r, "found shapes (3,) and ()"),
+    (lambda p: p.r == 2 * p.x, "found shapes (3,) and ()"),
+    (lambda p: p.x == p.x, "both sides are the same, so it says nothing"),
+    (lambda p: ca.SX(1) == 2, "both sides are constants that differ, so it can never hold"),
+    (lambda p: 3.0, "found float, expected an equation `a == b` or connect"),
+    (lambda p: None, "found NoneType, expected an equation"),
+    (lambda p: p.x + 1, "found '(x+1)', expected an equation; write `a == b`"),
+    (lambda p: p.x < 1, "found '(x<1)', expected an equation"),
+    (lambda p: between(0, p.x, 1), "found Between, expected an equation"),
+    (lambda p: (p.x if p.x > 0 else p.y) == 0, "use if_else, between"),
+    (lambda p: (p.x > 0 and p.y > 0) == 0, "use if_else, between"),
+    (lambda p: 0 < p.x < 1, "use if_else, between"),
+    (lambda p: p.x == p.y == p.length, "use if_else, between"),
+    (lambda p: p.x == max(p.y, 0), "casadi.fmax"),
+    (lambda p: p.x == math.sin(p.y), "found nan in `x == nan`"),
+    (lambda p: p.x == p.velocty, "Bench has no 'velocty'; did you mean 'velocity'?"),
+    (lambda p: p.x == p.y.squared, "SX has no 'squared'"),
+    (lambda p: p.x == ca.sinus(p.y), "casadi has no 'sinus'; did you mean"),
+    (lambda p: ca.sin([p.x, p.y]) == 0, "no number or expression among symbols; join lists"),
+    (lambda p: ca.cross(p.q, p.r) == 0, "Dimension of a (2x1 ) must equal that of b (3x1)"),
+    (lambda p: p.r[3] == 0, "out of bounds with supplied length of 3"),
+]
+
+
+@pytest.mark.parametrize(("statement", "words"), NO_EQUATIONS)
+def test_what_is_no_equation_is_refused_with_its_place(statement, words):
+    with pytest.raises(ModelError, match=rf"^the model \(Bench\), equation 2: .*{re.escape(words)}"):
         flatten(plant(statement))
 
 
@@ -173,17 +164,11 @@ class Springs(Model):
 @pytest.mark.parametrize(
     ("ends", "message"),
     [
-        (
-            lambda s: (s.mass.flange, s.shaft.flange_a),
-            r"joins different connectors: 'f' is in one of them only",
-        ),
-        (lambda s: (s.mass.flange, translational.Mass().flange), r"a Flange that is not part of this model"),
+        (lambda s: (s.mass.flange, s.shaft.flange_a), "different connectors: 'f' is in one of them only"),
+        (lambda s: (s.mass.flange, translational.Mass().flange), "a Flange that is not part of this model"),
         (lambda s: (s.mass.flange, s.mass), r"connect\(Flange, Mass\): expected two connectors; name those"),
         (lambda s: (s.mass, s.mass), r"connect\(Mass, Mass\): expected two connectors"),
-        (
-            lambda s: (s.mass.flang, s.mass.flange),
-            r"equation 1: Mass has no 'flang'; did you mean 'flange'\?",
-        ),
+        (lambda s: (s.mass.flang, s.mass.flange), r"equation 1: Mass has no 'flang'; did you mean 'flange'"),
     ],
 )
 def test_connections_that_cannot_be(ends, message):
@@ -199,9 +184,7 @@ def test_a_missing_world_is_named_with_the_remedy():
     class Ball(Model):
         body = PointMass()
 
-    with pytest.raises(
-        ModelError, match=r"body \(PointMass\): found no World .* declare `world = World\(\)` .*Ball"
-    ):
+    with pytest.raises(ModelError, match=r"body \(PointMass\): found no World .* `world = World\(\)` .*Ball"):
         flatten(Ball())
 
 
@@ -216,27 +199,17 @@ def test_too_few_equations():
     class Station(Model):
         pump = Pump()
 
-    with pytest.raises(
-        StructureError,
-        match=r"^Station: 2 unknowns, 1 equation\. Undetermined: pump\.flow \(no valve holds it\)\. Add 1 .* in pump,",
-    ):
+    words = r"^Station: 2 unknowns, 1 equation\. Undetermined: pump\.flow \(no valve holds it\)\. Add 1 .* in pump,"
+    with pytest.raises(StructureError, match=words):
         translate(Station())
     with pytest.raises(StructureError, match=r"Undetermined: pump\.flow \(the valve is stuck\)"):
         translate(Station(pump=dict(flow=dict(undetermined="the valve is stuck"))))
 
 
 def test_too_many_equations():
-    class Twice(Model):
-        x = Real(unit="1")
-
-        def equations(self):
-            yield self.x == 1
-            yield self.x == 2
-
-    with pytest.raises(
-        StructureError, match=r"1 unknown, 2 equations\. Overdetermined by 1: .*equation 2 `x == 2`"
-    ):
-        translate(Twice())
+    twice = plant(lambda p: p.y == 2)
+    with pytest.raises(StructureError, match=r"Overdetermined by 1: .*equation 2 `y == 2`"):
+        translate(twice)
 
 
 def test_an_equation_that_repeats_others_is_dropped_and_named():
@@ -322,11 +295,3 @@ def test_functions_and_derivatives_of_any_order():
     assert at["der(der(x))"] == pytest.approx(-1.2, rel=1e-14)
     np.testing.assert_allclose(at["r"], [0.3, 1.0, 2 * 4.0 - 2 * 0.3 * 1.2], rtol=1e-14)
     np.testing.assert_allclose(translate(Ringing()).evaluate({"x": -2.0, "v": 0.0})["r"][:2], [-0.5, -1.0])
-
-
-@pytest.mark.parametrize("order", [0, -1, 1.5, "2", True])
-def test_an_order_of_a_derivative_that_is_none(order):
-    with pytest.raises(
-        ModelError, match=r"equation 2: der: found order .*, expected a whole number of at least 1"
-    ):
-        translate(plant(lambda p: der(p.x, order) == 0))

@@ -1,5 +1,7 @@
 """An index out of an array is told with the array as it is written."""
 
+import re
+
 import pytest
 
 from gantrytau import Array, Input, Model, ModelError, Parameter, Real, translate
@@ -18,23 +20,11 @@ class Part(Model):
 @pytest.mark.parametrize(
     ("statement", "words"),
     [
-        (
-            lambda m: m.part.r[3] == 1,
-            r"`m\.part\.r\[3\]` is out of bounds with supplied length of .: found the index 3, expected 0 to 2",
-        ),
-        (
-            lambda m: m.part.r[0] == m.part.r[-4],
-            r"`m\.part\.r\[-4\]` is out of bounds; expected an index below",
-        ),
-        (
-            lambda m: m.part.R[2, 0] == 1,
-            r"`m\.part\.R\[2, 0\]` is out of bounds with supplied length of .: found the index 2, expected 0 to 1",
-        ),
-        (
-            lambda m: m.part.R[1, 0:5] == 1,
-            r"`m\.part\.R\[1, 0:5\]` is out of bounds with supplied length of .: found the index 0:5, expected 0 to 2",
-        ),
-        (lambda m: m.parts[2].u == 1, r"`m\.parts\[2\]` is out of bounds; expected an index below"),
+        (lambda m: m.part.r[3] == 1, "`m.part.r[3]`: 3, expected 0 to 2"),
+        (lambda m: m.part.r[0] == m.part.r[-4], "`m.part.r[-4]`: an index below"),
+        (lambda m: m.part.R[2, 0] == 1, "`m.part.R[2, 0]`: 2, expected 0 to 1"),
+        (lambda m: m.part.R[1, 0:5] == 1, "`m.part.R[1, 0:5]`: 0:5, expected 0 to 2"),
+        (lambda m: m.parts[2].u == 1, "`m.parts[2]`: an index below"),
     ],
 )
 def test_an_index_out_of_an_array_names_the_array(statement, words):
@@ -45,7 +35,8 @@ def test_an_index_out_of_an_array_names_the_array(statement, words):
         def equations(self):
             yield statement(self)
 
-    with pytest.raises(ModelError, match=r"^the model \(Whole\), equation 1: " + words):
+    array, _, index = map(re.escape, words.partition(": "))
+    with pytest.raises(ModelError, match=rf"^the model \(Whole\), equation 1: {array} is out .*{index}"):
         translate(Whole())
 
 
@@ -54,7 +45,5 @@ def test_an_index_out_of_a_parameter_names_the_parameter():
         p = Parameter([1.0, 2.0])
         q = Parameter(p[2])
 
-    with pytest.raises(
-        ModelError, match=r"^q: value is p\[2\], expected a number.*: .*found the index 2, expected 0 to 1"
-    ):
+    with pytest.raises(ModelError, match=r"^q: value is p\[2\], .*found the index 2, expected 0 to 1"):
         translate(Numbers())

@@ -80,9 +80,8 @@ def test_values_of_declarations_modifications_and_bindings():
     assert values(Pack(), "main.voltage", "cells[1].voltage") == [3.0, 1.5]
     assert values(Pack(total=5.0), "main.voltage", "cells[0].voltage") == [5.0, 2.5]
     assert values(Pack(main=dict(voltage=1.0)), "main.voltage", "main.resistance") == [1.0, 0.1]
-    assert values(
-        Rack(pack=dict(main=dict(resistance=2.0), total=9.0)), "pack.main.resistance", "pack.main.voltage"
-    ) == [2.0, 9.0]
+    rack = Rack(pack=dict(main=dict(resistance=2.0), total=9.0))
+    assert values(rack, "pack.main.resistance", "pack.main.voltage") == [2.0, 9.0]
 
 
 def test_nested_modifications_merge_from_outside_in():
@@ -90,22 +89,15 @@ def test_nested_modifications_merge_from_outside_in():
         pack = Pack(main=dict(voltage=1.0, resistance=1.0), cells=dict(resistance=7.0))
 
     model = Special(pack=dict(main=dict(resistance=2.0)))
-    wanted = (
-        "pack.main.voltage",
-        "pack.main.resistance",
-        "pack.cells[1].resistance",
-        "pack.cells[1].voltage",
-    )
-    assert values(model, *wanted) == [1.0, 2.0, 7.0, 1.5]
+    wanted = ("main.voltage", "main.resistance", "cells[1].resistance", "cells[1].voltage")
+    assert values(model, *(f"pack.{name}" for name in wanted)) == [1.0, 2.0, 7.0, 1.5]
 
 
 def test_arrays_take_one_modification_for_all_or_one_each():
-    assert values(Pack(cells=dict(resistance=2.0)), "cells[0].resistance", "cells[1].resistance") == [
-        2.0,
-        2.0,
-    ]
+    both = ("cells[0].resistance", "cells[1].resistance")
+    assert values(Pack(cells=dict(resistance=2.0)), *both) == [2.0, 2.0]
     each = Pack(cells=[dict(resistance=2.0), dict(resistance=3.0)])
-    assert values(each, "cells[0].resistance", "cells[1].resistance", "cells[1].voltage") == [2.0, 3.0, 1.5]
+    assert values(each, *both, "cells[1].voltage") == [2.0, 3.0, 1.5]
 
     class Uneven(Model):
         cells = Array(Cell, [dict(voltage=1.0), dict(voltage=2.0)], resistance=0.3)

@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, ModelError, Real, connect, der, linearize, simulate, sin, translate
 from gantrytau.mechanics import rotational, translational
+from tests.mechanisms.rows import in_a_row
 
 TOLERANCE = 1e-9
 KINDS = {translational: ("s", "v", "f"), rotational: ("phi", "w", "tau")}
@@ -81,14 +82,12 @@ def test_friction_falls_from_static_to_coulomb(kind, n):
 
 
 def test_a_slow_mass_on_falling_friction_is_unstable_and_a_fast_one_is_not():
-    class Pulled(Model):
-        """A mass that is pulled over a floor through nothing but its own speed."""
-
-        mass = translational.Mass(m=2.0)
-        floor = translational.StribeckFriction(f_c=4.0, f_s=7.0, v_stribeck=0.2, f_v=1.0)
-
-        def equations(self):
-            yield connect(self.mass.flange, self.floor.flange)
+    # A mass that is pulled over a floor through nothing but its own speed.
+    Pulled = in_a_row(
+        "Pulled",
+        mass=translational.Mass(m=2.0),
+        floor=translational.StribeckFriction(f_c=4.0, f_s=7.0, v_stribeck=0.2, f_v=1.0),
+    )
 
     for speed, sign in ((0.1, 1.0), (2.0, -1.0)):
         rate = np.real(linearize(translate(Pulled()), at={"mass.v": speed}).poles)
@@ -131,10 +130,7 @@ def test_dahl_yields_before_it_slides(kind):
 @pytest.mark.parametrize(
     ("friction", "words"),
     [
-        (
-            translational.StribeckFriction(f_c=4.0, f_s=3.0),
-            "static friction f_s of at least the Coulomb friction f_c",
-        ),
+        (translational.StribeckFriction(f_c=4.0, f_s=3.0), "static friction f_s of at least the Coulomb"),
         (rotational.StribeckFriction(tau_c=4.0, tau_s=3.0), "static friction tau_s of at least .* tau_c"),
         (translational.StribeckFriction(v_stribeck=0.0), "expected a Stribeck speed above zero"),
         (translational.DahlFriction(f_c=0.0), "Coulomb friction f_c above zero; take Frictionless for none"),

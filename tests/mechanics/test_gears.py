@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from gantrytau import Fixed, Model, StructureError, connect, simulate, sin, translate
+from gantrytau import Fixed, Model, StructureError, simulate, sin, translate
 from gantrytau.mechanics import gears, rotational, translational
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 NEAR = 1e3 * TOLERANCE  # the integrator holds its tolerance per step; over some seconds errors add up
@@ -19,28 +20,19 @@ class Turning(Model):
     damper, wall = rotational.Damper(d=4.0), rotational.Fixed()
 
     def equations(self):
-        yield connect(self.motor.flange, self.rotor.flange_a)
-        yield connect(self.rotor.flange_b, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.load.flange_a)
-        yield connect(self.load.flange_b, self.damper.flange_a)
-        yield connect(self.damper.flange_b, self.wall.flange)
+        yield from row(self.motor, self.rotor, self.gear, self.load, self.damper, self.wall)
 
 
-class Sliding(Model):
-    """A motor turns a rotor, which moves a mass through a gear against a spring."""
-
-    motor = rotational.Torque()
-    rotor = rotational.Inertia(J=0.02)
-    gear = gears.RackAndPinion(radius=0.05)
-    mass = translational.Mass(m=8.0)
-    spring, wall = translational.Spring(c=500.0), translational.Fixed()
-
-    def equations(self):
-        yield connect(self.motor.flange, self.rotor.flange_a)
-        yield connect(self.rotor.flange_b, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.mass.flange)
-        yield connect(self.mass.flange, self.spring.flange_a)
-        yield connect(self.spring.flange_b, self.wall.flange)
+# A motor turns a rotor, which moves a mass through a gear against a spring.
+Sliding = in_a_row(
+    "Sliding",
+    motor=rotational.Torque(),
+    rotor=rotational.Inertia(J=0.02),
+    gear=gears.RackAndPinion(radius=0.05),
+    mass=translational.Mass(m=8.0),
+    spring=translational.Spring(c=500.0),
+    wall=translational.Fixed(),
+)
 
 
 SLIDING = {
@@ -95,12 +87,9 @@ def test_one_turn_of_a_ball_screw_is_its_lead():
 
 
 def test_a_ball_screw_holds_a_load_with_little_torque():
-    class Press(Model):
-        motor, screw, load = rotational.Position(), gears.BallScrew(lead=0.01), translational.Force()
-
-        def equations(self):
-            yield connect(self.motor.flange, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.load.flange)
+    Press = in_a_row(
+        "Press", motor=rotational.Position(), screw=gears.BallScrew(lead=0.01), load=translational.Force()
+    )
 
     at = translate(Press()).evaluate({"load.f": -2000.0, "motor.phi": 0.3})
     assert at["motor.tau"] == pytest.approx(2000.0 * 0.01 / (2 * np.pi), rel=1e-14)
@@ -112,27 +101,20 @@ def test_an_axis_with_a_ball_screw_speeds_up_evenly():
         screw, slide = gears.BallScrew(lead=0.01), translational.Mass(m=12.0)
 
         def equations(self):
-            yield connect(self.motor.flange, self.rotor.flange_a)
-            yield connect(self.rotor.flange_b, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.slide.flange)
+            yield from row(self.motor, self.rotor, self.screw, self.slide)
 
     found = simulate(Axis(), stop=1.0, inputs={"motor.tau": 0.1}, tolerance=TOLERANCE)
     turn = 2 * np.pi / 0.01
     np.testing.assert_allclose(found["slide.v"], 0.1 * turn / (12.0 + 2e-4 * turn**2) * found.time, atol=NEAR)
 
 
-class Elastic(Model):
-    """A motor led along a motion, an elastic gear, a load."""
-
-    motor, gear, load = (
-        rotational.Position(),
-        gears.ElasticGear(ratio=10.0, c=50.0, d=0.0),
-        rotational.Inertia(J=2.0),
-    )
-
-    def equations(self):
-        yield connect(self.motor.flange, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.load.flange_a)
+# A motor led along a motion, an elastic gear, a load.
+Elastic = in_a_row(
+    "Elastic",
+    motor=rotational.Position(),
+    gear=gears.ElasticGear(ratio=10.0, c=50.0, d=0.0),
+    load=rotational.Inertia(J=2.0),
+)
 
 
 def test_a_load_swings_behind_an_elastic_gear():
@@ -164,8 +146,7 @@ def test_a_gear_held_at_both_ends_is_refused():
         gear, left, right = gears.IdealGear(ratio=3.0), rotational.Fixed(), rotational.Fixed()
 
         def equations(self):
-            yield connect(self.left.flange, self.gear.flange_a)
-            yield connect(self.gear.flange_b, self.right.flange)
+            yield from row(self.left, self.gear, self.right)
 
     with pytest.raises(StructureError, match=r"Undetermined: gear\.flange_a\.tau"):
         translate(Held())

@@ -6,10 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from gantrytau import Array, Fixed, Model, ModelError, connect, simulate, sin, translate
+from gantrytau import Array, Fixed, Model, ModelError, simulate, sin, translate
 from gantrytau.kinematics import TurntableScrew
 from gantrytau.mechanics import gears, rotational
 from gantrytau_models import F1GantryTau, prototypes
+from tests.mechanisms.rows import in_a_row, row
 
 TOLERANCE = 1e-10
 SCREW = TurntableScrew(base=0.3, crank=0.12, angle=1.2, lead=0.005)
@@ -23,9 +24,7 @@ class Table(Model):
     screw = gears.ScrewLever(**dataclasses.asdict(SCREW))
 
     def equations(self):
-        yield connect(self.motor.flange, self.spindle.flange_a)
-        yield connect(self.spindle.flange_b, self.screw.flange_a)
-        yield connect(self.screw.flange_b, self.table.flange_a)
+        yield from row(self.motor, self.spindle, self.screw, self.table)
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +60,12 @@ def test_the_motor_does_the_work_of_both_inertias(swinging):
 
 
 def test_a_motor_that_leads_tells_the_angle_of_the_table():
-    class Led(Model):
-        motor, screw, load = (
-            rotational.Position(),
-            gears.ScrewLever(**dataclasses.asdict(SCREW)),
-            rotational.Torque(),
-        )
-
-        def equations(self):
-            yield connect(self.motor.flange, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.load.flange)
+    Led = in_a_row(
+        "Led",
+        motor=rotational.Position(),
+        screw=gears.ScrewLever(**dataclasses.asdict(SCREW)),
+        load=rotational.Torque(),
+    )
 
     dae = translate(Led())
     for theta in (-40.0, 0.0, 3.0, 55.0):
@@ -94,8 +89,7 @@ def test_turntables_of_an_f1_on_screws():
         def equations(self):
             yield from super().equations()
             for screw, spindle, table in zip(self.screws, self.spindles, self.turntables, strict=True):
-                yield connect(spindle.flange_b, screw.flange_a)
-                yield connect(screw.flange_b, table.joint.axis)
+                yield from row(spindle, screw, table.joint.axis)
 
     at = translate(Screwed(prototypes.F1)).evaluate({f"turntables[{k}].phi": 0.1 * (k + 1) for k in range(3)})
     for k, screw in enumerate(screws):

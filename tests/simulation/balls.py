@@ -1,15 +1,6 @@
 """A ball that falls on a floor and bounces, which several files of tests throw."""
 
-from gantrytau import (
-    Discrete,
-    Model,
-    Parameter,
-    Real,
-    der,
-    pre,
-    reinit,
-    when,
-)
+from gantrytau import Discrete, Model, Parameter, Real, der, pre, reinit, when
 
 G = 9.81  # m/s2
 

@@ -156,9 +156,7 @@ def test_turns_that_accumulate_at_a_pole_are_told(monkeypatch):
             yield der(self.x) == 1
             yield when(floor(1 / self.x) > 3, self.n == pre(self.n) + 1)
 
-    with pytest.raises(
-        SolveError, match=r"condition on x turned thousands of times, in intervals that shrink"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"condition on x turned thousands of times") as caught:
         simulate(Counting(), stop=3.0)
     assert caught.value.time == pytest.approx(1.0, abs=1e-2)
 

@@ -34,6 +34,7 @@ from gantrytau.mechanics import multibody as mb
 from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.gears import RackAndPinion
 from tests.families import first_of
+from tests.mechanisms.rows import in_a_row, row
 
 LENGTH, G = 0.5, 9.81  # m, of the load's rope; m/s2
 
@@ -74,10 +75,7 @@ class Crane(Model):
     rod, load = mb.FixedTranslation(r=[0, 0, -LENGTH]), mb.PointMass(m=1.0)
 
     def equations(self) -> Any:
-        yield connect(self.world.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.load.frame_a)
+        yield from row(self.world, self.slide, self.hinge, self.rod, self.load)
         yield connect(self.drive.flange, self.slide.axis)
 
 
@@ -166,9 +164,7 @@ class Divider(Model):
     C, D, R = Capacitor(C=1e-3), Capacitor(C=3e-3), Resistor(R=1e3)
 
     def equations(self) -> Any:
-        yield connect(self.s.pin_a, self.C.pin_a)
-        yield connect(self.C.pin_b, self.D.pin_a)
-        yield connect(self.D.pin_b, self.s.pin_b)
+        yield from row(self.s.pin_a, self.C, self.D, self.s.pin_b)
         yield connect(self.s.pin_b, self.g.pin)
         yield connect(self.R.pin_a, self.D.pin_a)
         yield connect(self.R.pin_b, self.g.pin)
@@ -302,16 +298,14 @@ def test_modes_that_turn_to_and_fro_throw_once_each_time():
     assert found.final("v") == pytest.approx(v, rel=1e-6)
 
 
-class Rack(Model):
-    """A wheel of 0.1 m that a rack turns, whose angle is prescribed, with a mass that a damper drags along."""
-
-    drive, gear = rotational.Position(), RackAndPinion(radius=0.1)
-    damper, mass = translational.Damper(d=3.0), translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.0))
-
-    def equations(self) -> Any:
-        yield connect(self.drive.flange, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.damper.flange_a)
-        yield connect(self.damper.flange_b, self.mass.flange)
+# A wheel of 0.1 m that a rack turns, whose angle is prescribed, with a mass that a damper drags along.
+Rack = in_a_row(
+    "Rack",
+    drive=rotational.Position(),
+    gear=RackAndPinion(radius=0.1),
+    damper=translational.Damper(d=3.0),
+    mass=translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.0)),
+)
 
 
 def test_a_damper_passes_on_a_jump_of_its_end_as_an_impulse():
@@ -319,11 +313,7 @@ def test_a_damper_passes_on_a_jump_of_its_end_as_an_impulse():
     assert found.at(1.0, "mass.v") == pytest.approx(3.0 * 0.4 / 2.0, rel=1e-9)  # d * jump / m
 
 
-class Held(Model):
-    drive, mass = translational.Position(), translational.Mass(m=1.0)
-
-    def equations(self) -> Any:
-        yield connect(self.drive.flange, self.mass.flange)
+Held = in_a_row("Held", drive=translational.Position(), mass=translational.Mass(m=1.0))
 
 
 def test_a_position_that_jumps_on_a_mass_is_refused():

@@ -5,6 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Model, Real, Start, connect, der, simulate, sin, sqrt, time
 from gantrytau.mechanics import multibody, rotational, translational
+from tests.mechanisms.rows import row
 
 
 class CarAxis(Model):
@@ -104,17 +105,13 @@ class Squeezer(Model):
             (self.r7.frame_b, self.omega, self.k6, self.r6),
         )
         for before, joint, one, arm in chains:
-            yield connect(before, joint.frame_a)
-            yield connect(joint.frame_b, one.frame_a)
+            yield from row(before, joint, one)
             yield connect(joint.frame_b, arm.frame_a)
-        yield connect(self.gamma.frame_b, self.tip.frame_a)
-        yield connect(self.tip.frame_b, self.line.frame_a)
-        yield connect(self.line.frame_b, self.C.frame_b)
+        yield from row(self.gamma, self.tip, self.line, self.C)
         yield connect(self.line.flange_a, self.spring.flange_a)
         yield connect(self.line.flange_b, self.spring.flange_b)
         for pin, arm in ((self.p3, self.r3), (self.p4, self.r4), (self.p6, self.r6)):
-            yield connect(self.r2.frame_b, pin.frame_a)
-            yield connect(pin.frame_b, arm.frame_b)
+            yield from row(self.r2, pin, arm.frame_b)
 
 
 @pytest.mark.nightly

@@ -37,9 +37,7 @@ def test_counters_and_drives_at_instants_of_time():
             yield der(self.x) == self.on
             yield when(time >= self.begin + self.duty * self.T, self.on == 0)
             yield when(
-                time >= self.begin + self.T,
-                self.begin == pre(self.begin) + self.T,
-                self.n == pre(self.n) + 1,
+                time >= self.begin + self.T, self.begin == pre(self.begin) + self.T, self.n == pre(self.n) + 1
             )
 
     class Twice(Drive):

@@ -7,6 +7,7 @@ import pytest
 
 from gantrytau import Bounds, DoubtfulResult, Fixed, Model, ModelError, Real, connect, der, simulate
 from gantrytau.mechanics import rotational, translational
+from tests.mechanisms.rows import in_a_row
 
 
 class Throw(Model):
@@ -46,20 +47,12 @@ def test_nothing_is_said_of_limits_that_are_kept_or_not_looked_at(model, limits)
         simulate(model, stop=2.0, limits=limits)
 
 
-def test_another_word_for_limits_is_refused():
-    with pytest.raises(ModelError, match="found limits='end', expected 'warn' or 'stop' or None") as error:
-        simulate(Throw(), stop=1.0, limits="end")  # pyright: ignore[reportArgumentType]
-    assert error.value.argument == "limits"
-
-
-class Slide(Model):
-    """A mass between stops."""
-
-    mass = translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.4))
-    stop = translational.EndStop(low=-0.1, high=0.2, a=0.0)
-
-    def equations(self):
-        yield connect(self.mass.flange, self.stop.flange)
+# A mass between stops.
+Slide = in_a_row(
+    "Slide",
+    mass=translational.Mass(m=2.0, s=Fixed(0.0), v=Fixed(0.4)),
+    stop=translational.EndStop(low=-0.1, high=0.2, a=0.0),
+)
 
 
 class Turning(Model):

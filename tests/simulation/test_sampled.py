@@ -355,9 +355,7 @@ def test_derivatives_that_only_the_sampling_asks_for_are_found():
     found = simulate(Rates(), stop=1.0, points=11, inputs={"course": lambda t: sin(3 * t)})
     assert np.allclose(found["rate"], 3 * np.cos(3 * found.time), rtol=1e-12)
     assert np.abs(found["fall"] + 2 * np.exp(-2 * found.time)).max() < NEAR
-    with pytest.raises(
-        ModelError, match="input course is differentiated 1 times by the model, which samples do"
-    ):
+    with pytest.raises(ModelError, match="input course is differentiated 1 times by the model"):
         simulate(Rates(), stop=1.0, inputs={"course": ([0.0, 1.0], [0.0, 1.0])})
 
 

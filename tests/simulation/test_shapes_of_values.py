@@ -98,20 +98,13 @@ def test_another_shape_is_refused_everywhere(name, value, words):
 
 
 def test_another_shape_of_samples_parameters_and_starts_is_refused():
-    with pytest.raises(
-        ModelError,
-        match=r"input U: found samples of shape \(6,\), expected \(2, 3\); give values of shape \(n, rows, columns\)",
-    ):
+    with pytest.raises(ModelError, match=r"input U: found samples of shape \(6,\), expected \(2, 3\)"):
         final(inputs={"U": ([0.0, 1.0], [WIDE.ravel(), WIDE.ravel()])})
-    with pytest.raises(
-        ModelError, match=r"input u: found 4 values, expected 2.*; samples are a tuple, \(times, values\)"
-    ):
+    with pytest.raises(ModelError, match=r"input u: found 4 values, expected 2.*; samples are a tuple"):
         final(inputs={"u": [[0.0, 1.0], [5.0, 7.0]]})
-    with pytest.raises(ModelError, match=r"P: value has shape \(3, 2\), expected \(2, 3\)"):
+    with pytest.raises(ModelError, match=r"P: found shape \(3, 2\), expected \(2, 3\)"):
         final(parameters={"P": WIDE.T})
-    with pytest.raises(
-        ModelError, match=r"X: start has shape \(3, 2\), expected \(2, 3\); give rows of columns"
-    ):
+    with pytest.raises(ModelError, match=r"X: start has shape \(3, 2\), expected \(2, 3\)"):
         translate(Shapes(X=Start(WIDE.T)))
 
 

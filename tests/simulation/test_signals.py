@@ -173,9 +173,7 @@ def test_smooth_signals_are_functions_of_time_that_can_be_differentiated(signal)
     h = found.time[1]
     rate = (signal.values(found.time[1:-1] + h / 2) - signal.values(found.time[1:-1] - h / 2)) / h
     np.testing.assert_allclose(found["v"][1:-1], rate, atol=(2 * np.pi * 4 * h) ** 2 * 3 * 30)
-    with pytest.raises(
-        ModelError, match="input u is differentiated 2 times by the model, which samples do not allow"
-    ):
+    with pytest.raises(ModelError, match="input u is differentiated 2 times by the model"):
         simulate(Differentiator(), stop=2.0, inputs={"u": prbs(5, 0.1, seed=1)})
 
 
@@ -211,29 +209,13 @@ def test_noise_of_one_std_for_all_elements():
 @pytest.mark.parametrize(
     ("inputs", "seed", "words"),
     [
-        (
-            {"u": white_noise(1.0, 0.1)},
-            None,
-            "input u: white_noise has no seed; give it one, as seed=1, or give the run one",
-        ),
+        ({"u": white_noise(1.0, 0.1)}, None, "input u: white_noise has no seed; give it one, as seed=1"),
         ({"u": multisine([1.0], phases="random")}, None, "input u: multisine has no seed"),
         ({"u": white_noise(1.0, 0.1)}, 1.5, "found seed=1.5, expected a whole number"),
         ({"u": white_noise([1.0, 2.0], 0.1, 1)}, None, "input u: found 2 columns, expected 1"),
-        (
-            {"u": white_noise(1.0, 1e-9, 1)},
-            None,
-            "input u: white_noise(std=1.0, period=1e-09, seed=1): the run needs 1e+09",
-        ),
-        (
-            {"u": Samples([0.0], [1.0])},
-            None,
-            "samples cover 0 to 0 s, expected 0 to 1 s; add samples, or say kind='constant'",
-        ),
-        (
-            {"u": Samples([0.5, 2.0], [1.0, 2.0], kind="constant")},
-            None,
-            "samples cover 0.5 to 2 s, expected 0 to 1 s",
-        ),
+        ({"u": white_noise(1.0, 1e-9, 1)}, None, "input u: white_noise(std=1.0, period=1e-09"),
+        ({"u": Samples([0.0], [1.0])}, None, "samples cover 0 to 0 s, expected 0 to 1 s; add samples"),
+        ({"u": Samples([0.5, 2.0], [1.0, 2.0], kind="constant")}, None, "samples cover 0.5 to 2 s"),
     ],
 )
 def test_wrong_signals(inputs, seed, words):

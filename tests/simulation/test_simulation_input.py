@@ -23,30 +23,18 @@ from tests.simulation.test_simulation import Circuit, Oscillator
         ({"x": 1.0}, "x is not an input of Oscillator (inputs: f)"),
         ({"f": [1.0, 2.0]}, "input f: found 2 values, expected 1"),
         ({"f": math.nan}, "expected finite numbers"),
-        (
-            {"f": "strong"},
-            "input f: found 'strong', expected a number and its unit, as '2.5 kN'",
-        ),
-        (
-            {"f": object()},
-            "expected a number, a function of time, Samples(times, values) or a signal as white_noise",
-        ),
+        ({"f": "strong"}, "input f: found 'strong', expected a number and its unit"),
+        ({"f": object()}, "expected a number, a function of time, Samples(times"),
         ({"f": ([0.0, 1.0], [0.0, math.nan])}, "input f: Samples: row 1 is not finite, expected numbers"),
-        (
-            {"f": ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0])},
-            "input f: Samples: the time falls from 2 s in row 1 to 1 s",
-        ),
-        (
-            {"f": ([0.0], [0.0])},
-            "samples cover 0 to 0 s, expected 0 to 1 s; add samples, or say kind='constant'",
-        ),
+        ({"f": ([0.0, 2.0, 1.0], [0.0, 1.0, 1.0])}, "input f: Samples: the time falls from 2 s in row 1 to"),
+        ({"f": ([0.0], [0.0])}, "samples cover 0 to 0 s, expected 0 to 1 s; add samples"),
         ({"f": ([0.0, 0.5], [0.0, 1.0])}, "samples cover 0 to 0.5 s, expected 0 to 1 s"),
         ({"f": ([0.0, 1.0], [[0.0, 1.0], [1.0, 2.0]])}, "input f: found 2 columns, expected 1"),
         ({"f": math.sin}, "input f: the function of time does not work on a symbol"),
         ({"f": lambda t: 1.0 if t > 1 else 2.0}, "write it with gantrytau.sin, exp, if_else"),
         ({"f": lambda t: [t, t]}, "input f: found 2 values, expected 1"),
         ({"f": lambda: 1.0}, "input f: the function of time"),
-        (3.0, "inputs: found 3.0, expected"),
+        (3.0, "found inputs=3.0, expected"),
     ],
 )
 def test_wrong_inputs(inputs, words):
@@ -70,24 +58,19 @@ def test_samples_cannot_be_differentiated():
 
     found = simulate(Differentiator(), stop=1.0, inputs={"u": lambda t: t**2})
     np.testing.assert_allclose(found["v"], 2 * found.time, atol=1e-12)
-    with pytest.raises(
-        ModelError, match="input u is differentiated 1 times by the model, which samples do not allow"
-    ):
+    with pytest.raises(ModelError, match="input u is differentiated 1 times by the model"):
         simulate(Differentiator(), stop=1.0, inputs={"u": ([0.0, 1.0], [0.0, 1.0])})
 
 
 @pytest.mark.parametrize(
     ("keywords", "words"),
     [
-        (dict(stop=-1.0), "expected start < stop"),
-        (dict(stop=math.nan), "expected start < stop"),
-        (dict(stop="late"), "expected start < stop"),
-        (dict(stop=1.0, tolerance=0.0), "tolerance=0.0, expected a number between 0 and 1"),
-        (dict(stop=1.0, points=1), "points=1, expected a whole number of at least 2"),
-        (dict(stop=1.0, points=10.5), "points=10.5"),
+        (dict(start=2.0, stop=1.0), "found stop=1.0, expected a number above 2 in s"),
+        (dict(stop=1.0, tolerance=0.0), "found tolerance=0.0"),
+        (dict(stop=1.0, points=1), "found points=1, expected a whole number of at least 2"),
         (dict(stop=1.0, parameters={"k": 1.0}), "has no parameter 'k'"),
-        (dict(stop=1.0, parameters={"c": [1.0, 2.0]}), "c: value has shape (2,), expected ()"),
-        (dict(stop=1.0, parameters={"c": math.inf}), "expected a finite number"),
+        (dict(stop=1.0, parameters={"c": [1.0, 2.0]}), "c: found 2 values, expected 1"),
+        (dict(stop=1.0, parameters={"c": math.inf}), "c: found inf, expected finite numbers"),
         (dict(stop=1.0, parameters={"c": "stiff"}), "c: found 'stiff', expected"),
         (dict(stop=1.0, outputs="x"), "write ['x']"),
     ],

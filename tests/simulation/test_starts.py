@@ -88,18 +88,15 @@ def test_it_takes_no_new_translation():
     ("keywords", "words"),
     [
         (dict(starts={"z": 1.0}), "Spring has no variable or parameter 'z'"),
-        (dict(starts={"c": 1.0}), "c is a parameter, expected a variable; give it as parameters={'c': ...}"),
-        (dict(starts={"f": 1.0}), "f is an input, expected a variable; give it as inputs={'f': ...}"),
+        (dict(starts={"c": 1.0}), "c is a parameter, expected a variable; give it in parameters"),
+        (dict(starts={"f": 1.0}), "f is an input, expected a variable; give it in inputs"),
         (dict(starts={"der(x)": 1.0}), "der(x) is no declared variable"),
         (dict(starts={"x": 1.0}), "starts: x: found 1 values, expected 2"),
         (dict(starts={"x[0]": math.nan}), "starts: x[0]: found nan, expected finite numbers"),
         (dict(starts={"x[0]": 1.0, "twice": 3.0}), "twice contradicts x[0], of which it is an alias"),
-        (dict(starts=[1.0]), "starts: found [1.0], expected {name: value}"),
-        (
-            dict(parameters={"x.start": 3.0}),
-            "x is a variable, simulate takes another start value of it as starts={'x': ...}",
-        ),
-        (dict(parameters={"x": 3.0}), "starts={'x': ...}"),
+        (dict(starts=[1.0]), "Spring: found starts=[1.0], expected {name: value}"),
+        (dict(parameters={"x.start": 3.0}), "x is a variable, its start goes in starts"),
+        (dict(parameters={"x": 3.0}), "x is a variable, its start goes in starts"),
     ],
 )
 def test_wrong_starts(keywords, words):

@@ -3,20 +3,11 @@
 import numpy as np
 import pytest
 
-from gantrytau import (
-    Array,
-    Fixed,
-    Model,
-    Real,
-    StructureError,
-    connect,
-    der,
-    simulate,
-    sin,
-)
+from gantrytau import Array, Fixed, Model, Real, StructureError, connect, der, simulate, sin
 from gantrytau.mechanics import gears, rotational, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import FourBar, GantryTau, prototypes
+from tests.mechanisms.rows import row
 from tests.references.sticking import Chain, M, Plank, shaken
 from tests.simulation.test_sticking_motions import NEAR, TOLERANCE, lawful
 
@@ -35,11 +26,7 @@ def test_several_stick_and_slip_and_energy_balances(amplitude):
             yield der(self.lost) == sum(floor.f * floor.v for floor in self.floors)
 
     rest = [dict(s=Fixed(0.0), v=Fixed(0.0))] * 3
-    run = simulate(
-        Balanced(masses=rest, amplitude=amplitude),
-        stop=3.0,
-        tolerance=TOLERANCE,
-    )
+    run = simulate(Balanced(masses=rest, amplitude=amplitude), stop=3.0, tolerance=TOLERANCE)
     kinetic = sum(run[f"masses[{k}].v"] ** 2 for k in range(3)) / 2
     elastic = sum(200.0 * run[f"springs[{k}].s_rel"] ** 2 for k in range(2)) / 2
     balance = kinetic + elastic + run["lost"] - run["given"]
@@ -98,10 +85,7 @@ def test_a_geared_shaft_sticks_on_the_side_of_the_slide():
         rail = StickSlipFriction(f_c=100.0, f_s=150.0)
 
         def equations(self):
-            yield connect(self.motor.flange, self.rotor.flange_a)
-            yield connect(self.rotor.flange_b, self.screw.flange_a)
-            yield connect(self.screw.flange_b, self.slide.flange)
-            yield connect(self.slide.flange, self.rail.flange)
+            yield from row(self.motor, self.rotor, self.screw, self.slide, self.rail)
 
     lead = 0.01 / (2 * np.pi)
     run = simulate(Geared(), stop=1.0, tolerance=TOLERANCE, inputs={"motor.tau": ([0.0, 1.0], [0.0, 0.5])})
@@ -118,9 +102,7 @@ def test_carts_of_the_robot_stick_and_slip():
     run = simulate(robot, stop=1.0, parameters=hold)
     assert np.abs(run["tool.r"] - run["tool.r"][0]).max() < 1e-12
     run = simulate(
-        robot,
-        stop=1.0,
-        inputs={f"carts[{k}].f": lambda t, k=k: 400.0 * sin(6 * t + k) for k in range(3)},
+        robot, stop=1.0, inputs={f"carts[{k}].f": lambda t, k=k: 400.0 * sin(6 * t + k) for k in range(3)}
     )
     for k in range(3):
         mode, v = run[f"carts[{k}].law.mode"], run[f"carts[{k}].v"]

@@ -28,6 +28,7 @@ from gantrytau import (
 from gantrytau.mechanics import multibody, translational
 from gantrytau.mechanics.translational import StickSlipFriction
 from gantrytau_models import GantryTau, prototypes
+from tests.mechanisms.rows import in_a_row, row
 from tests.references.sticking import M, OnSpring, Shaken, on_spring, shaken
 
 TOLERANCE = 1e-10
@@ -134,8 +135,7 @@ class Incline(Model):
     floor = StickSlipFriction(f_c=8.0, f_s=10.0)
 
     def equations(self):
-        yield connect(self.ground.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.block.frame_a)
+        yield from row(self.ground, self.slide, self.block)
         yield connect(self.slide.axis, self.floor.flange)
 
 
@@ -161,14 +161,8 @@ def test_a_block_on_a_slope_stays_or_slides():
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_a_sliding_block_stops_where_its_energy_ends(size):
-    class Sliding(Model):
-        """A mass on a floor."""
-
-        mass = translational.Mass(m=2.0)
-        floor = StickSlipFriction(f_c=4.0 * size)
-
-        def equations(self):
-            yield connect(self.mass.flange, self.floor.flange)
+    # A mass on a floor.
+    Sliding = in_a_row("Sliding", mass=translational.Mass(m=2.0), floor=StickSlipFriction(f_c=4.0 * size))
 
     start = dict(s=Fixed(0.0), v=Fixed(size))
     near = dict(s=dict(nominal=size), v=dict(nominal=size))

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from gantrytau import Array, Model, ModelError, Parameter, Real, connect, der, flatten
+from gantrytau import Array, Model, ModelError, Parameter, Real, der, flatten
 from gantrytau.language.self_description.appearance import Ball, Cuboid, Stick
 from gantrytau.mechanics.multibody import FixedTranslation, PointMass, Prismatic, World
 from gantrytau_models import DeltaRobot, F1GantryTau, GantryTau, Pendulum, SixLinkGantryTau, prototypes
+from tests.mechanisms.rows import in_a_row, row
 
 
 class Slide(Model):
@@ -17,8 +18,7 @@ class Slide(Model):
     body = PointMass(m=1.0)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.body.frame_a)
+        yield from row(self.world, self.slide, self.body)
 
 
 class Slides(Model):
@@ -115,12 +115,7 @@ def test_numbers_may_be_arrays():
 
 
 def test_a_translation_is_a_stick():
-    class Post(Model):
-        world = World()
-        post = FixedTranslation(r=[0.0, 0.0, 1.0])
-
-        def equations(self):
-            yield connect(self.world.frame_b, self.post.frame_a)
+    Post = in_a_row("Post", world=World(), post=FixedTranslation(r=[0.0, 0.0, 1.0]))
 
     (stick,) = flatten(Post()).shapes
     assert isinstance(stick, Stick)

@@ -71,17 +71,7 @@ def test_a_lump_has_the_inertia_of_its_body():
     constants |= {f"R[{i},{j}]": float(i == j) for i in range(3) for j in range(3)}
     constants |= {f"c[{i}]": 0.1 * i for i in range(3)} | {"m": 8.0}
     lump = Lump(at=(1.0, 0.0, 0.0), R="R", mass="m", r_cm="c", J="J")
-    (solid,) = solids(
-        film_of(
-            Result(
-                [0.0],
-                constants,
-                shapes=[
-                    lump,
-                ],
-            )
-        )
-    )
+    (solid,) = solids(film_of(Result([0.0], constants, shapes=[lump])))
     edges, R = solid.size[0], solid.R[0]
     moments = 8.0 / 12 * (np.sum(edges**2) - edges**2)  # of a cuboid
     assert np.allclose(R @ np.diag(moments) @ R.T, J, rtol=1e-12)
@@ -131,18 +121,13 @@ def test_what_cannot_be_shown_is_told(fall):
         lambda: animate(3.0)
     )
     assert "found an empty list" in refused(lambda: animate([]))
-    assert "found 1 names for 2 results" in refused(lambda: animate([fall, fall], names=["a"]))
-    wrong: Any
-    for wrong in (0, -1.0, np.inf, np.nan, "fast"):
-        message = refused(lambda speed=wrong: animate(fall, speed=speed))
-        assert f"found speed={wrong!r}, expected a positive number" in message
+    for names in (["a"], "ab"):
+        message = refused(lambda names=names: animate([fall, fall], names=names))
+        assert f"found names={names!r}, expected a list of texts, one for each of 2 results" in message
     assert "around: found float, expected obstacles" in refused(lambda: animate(fall, around=[1.0]))
     assert "view: found Result, expected a model" in refused(lambda: view(fall))
     pose: Any = "tool.r"
     assert "view: found pose='tool.r', expected values by name" in refused(lambda: view(Pendulum, pose))
-    assert "animate: found names='ab', expected a list of texts" in refused(
-        lambda: animate([fall, fall], names="ab")
-    )
 
 
 def test_a_model_without_anything_to_be_seen_is_told():
@@ -169,22 +154,13 @@ def test_values_that_are_not_finite_are_told():
 @pytest.mark.parametrize(
     ("shape", "words"),
     [
-        (
-            Stick(a=(0.0, 0.0, 0.0), b=(0.0, 0.0)),
-            "found (0.0, 0.0) of shape (2,) in shapes(), expected one of shape (3,)",
-        ),
+        (Stick(a=(0.0, 0.0, 0.0), b=(0.0, 0.0)), "found (0.0, 0.0) of shape (2,) in shapes()"),
         (Ball(at="x"), "found 'x' of shape () in shapes(), expected one of shape (3,); a place is the name"),
-        (Ball(at=(np.nan, 0.0, 0.0)), "found nan in shapes(), expected names or finite numbers"),
-        (Stick(a=(0.0, 0.0, 0.0), b=NOTHING), "found None in shapes(), expected names or finite"),
-        (
-            Ball(at=AT_X, radius=-1.0),
-            "the model: found the radius or mass -1 of a Ball, expected none below 0",
-        ),
+        (Ball(at=(np.nan, 0.0, 0.0)), "found shapes() = nan, expected finite numbers"),
+        (Stick(a=(0.0, 0.0, 0.0), b=NOTHING), "found shapes() = nan, expected finite"),
+        (Ball(at=AT_X, radius=-1.0), "the model: found the radius or mass -1 of a Ball"),
         (Hinge(at=AT_X, axis=(0.0, 0.0, 0.0)), "found the direction [0, 0, 0] of a Hinge"),
-        (
-            Cuboid(at=AT_X, size=(1.0, 1.0, 1.0), R="x"),
-            "of shape () in shapes(), expected one of shape (3, 3)",
-        ),
+        (Cuboid(at=AT_X, size=(1.0, 1.0, 1.0), R="x"), "of shape () in shapes(), expected one of shape (3"),
     ],
 )
 def test_shapes_that_cannot_be_are_told(shape, words):

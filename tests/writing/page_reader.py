@@ -42,9 +42,13 @@ class Element:
         return "".join(x if isinstance(x, str) else x.text for x in self.inside)
 
     def find(self, *tags: str) -> "list[Element]":
-        """All elements of these tags in it."""
+        """All elements of these tags in it, of any without them."""
         deep = [x for x in self.inside if isinstance(x, Element)]
-        return [found for x in deep for found in ([x] if x.tag in tags else []) + x.find(*tags)]
+        return [found for x in deep for found in ([x] if x.tag in tags or not tags else []) + x.find(*tags)]
+
+    def values(self, key: str) -> list[str]:
+        """The values of an attribute."""
+        return [x.attributes[key] or "" for x in self.find() if key in x.attributes]
 
 
 class Reader(HTMLParser):
@@ -58,6 +62,8 @@ class Reader(HTMLParser):
         self.root = Element("page", {})
         self.open = [self.root]
         self.feed(text)
+        self.close()
+        assert self.open == [self.root]
 
     def handle_starttag(self, tag: str, attrs: Any) -> None:
         closed = self.closes.get(tag, ("p",) if tag in self.ends else ())

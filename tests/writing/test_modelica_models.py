@@ -161,13 +161,13 @@ def test_redundant_constraints_are_replaced_by_forces_that_are_zero(four_bar):
 
 
 def rank(dae, equations):
-    """Rank of the slopes of equations by all variables and their derivatives, at the consistent start."""
+    """Rank of the Jacobian of equations by all variables and their derivatives, at the consistent start."""
     values = {**dae.evaluate({}), **dae.table.values}
     residuals = dae.reduced.definitions.to_reduced(ca.vertcat(*(e.residual for e in equations)))
     symbols = ca.vertcat(*ca.symvar(residuals))
     unknown = ca.vertcat(*(s for s in symbols.elements() if s.name() not in dae.parameters))
-    slopes = ca.Function("slopes", [symbols], [ca.densify(ca.jacobian(residuals, unknown))])
-    at = slopes(ca.DM([values[s.name()] for s in symbols.elements()]))
+    jacobian = ca.Function("jacobian", [symbols], [ca.densify(ca.jacobian(residuals, unknown))])
+    at = jacobian(ca.DM([values[s.name()] for s in symbols.elements()]))
     # the start closes the loop to 1e-10, and what does not repeat others differs by lengths of 0.1 m
     return np.linalg.matrix_rank(np.array(at), tol=1e-7)
 

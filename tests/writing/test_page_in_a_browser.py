@@ -7,9 +7,7 @@ from gantrytau_models import FourBar, GantryTau, SixLinkGantryTau, prototypes
 from tests.viewing.browser import browsing, found
 
 BROWSER = found() or ""
-pytestmark = pytest.mark.skipif(
-    not BROWSER, reason="no Chromium or Chrome is installed, apt install chromium"
-)
+pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium or Chrome, apt install chromium")
 WIDTH = 1000  # pixels
 
 

@@ -51,20 +51,15 @@ def universal(x86_64: bytes, arm64: bytes) -> bytes:
     return (struct.pack(">2I", 0xCAFEBABE, 2) + b"".join(entries)).ljust(offset, b"\0") + body
 
 
-def write_fmu(path: str | os.PathLike[str], members: Mapping[str, bytes], *, overwrite: bool = True) -> Path:
-    """Write an FMU; see `write_archive`."""
-    return write_archive(path, members, suffix=".fmu", first="modelDescription.xml", overwrite=overwrite)
-
-
 def write_archive(
     path: str | os.PathLike[str],
     members: Mapping[str, bytes],
     *,
-    suffix: str,
-    first: str,
+    suffix: str = ".fmu",
+    first: str = "modelDescription.xml",
     overwrite: bool = True,
 ) -> Path:
-    """Write members, name -> content, into a ZIP archive that appears whole or not at all.
+    """Write members, name -> content, into a ZIP archive, by default an FMU, that appears whole or not at all.
 
     suffix: what `path` must end with; first: the member that comes first, the others follow by name. The same
     members give the same bytes.

@@ -20,6 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from gantrytau.border.refusal import GantryTauError, ModelError
+from gantrytau.interruption import uninterrupted
 from gantrytau_fmu.building.platforms import Platform
 
 UNIT = "fmu.c"  # the one file that is compiled; it includes the others
@@ -131,7 +132,8 @@ def _run(commands: Mapping[Platform, Sequence[str]], folder: Path, identifier: s
         while waiting or running:
             while waiting and len(running) < (os.cpu_count() or 1):
                 platform = waiting.pop(0)
-                running[platform] = _start(commands[platform], folder, platform, environment)
+                with uninterrupted():  # a compiler that is started is known, and so can be stopped
+                    running[platform] = _start(commands[platform], folder, platform, environment)
             for platform, process in list(running.items()):
                 if process.poll() is not None:
                     del running[platform]

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.checks import one_of
 
 
 @dataclass(frozen=True)
@@ -84,16 +84,6 @@ def chosen(platforms: str | Sequence[str]) -> tuple[Platform, ...]:
         elif name in PLATFORMS:
             found[name] = PLATFORMS[name]
         else:
-            known = (*_GROUPS, *PLATFORMS, *ALIASES)
-            raise ModelError(
-                f"platforms: found '{name}', expected one of {', '.join(known)}{_closest(name, known)}",
-                argument="platforms",
-            )
+            one_of("Build", "platforms", name, (*_GROUPS, *PLATFORMS, *ALIASES))
     order = {name: place for place, name in enumerate(PLATFORMS)}
     return tuple(sorted(found.values(), key=lambda platform: order.get(platform.name, len(order))))
-
-
-def _closest(name: str, known: Sequence[str]) -> str:
-    """The nearest name as a question; nothing if none is near, as the message lists all."""
-    words = did_you_mean(name.lower(), known)
-    return words if "did you mean" in words else ""

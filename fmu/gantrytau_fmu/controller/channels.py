@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gantrytau.border.checks import instance, number, whole
 from gantrytau.border.dimensions import dimension
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.describing.record import Record
 
 Values = NDArray[np.float64]
@@ -31,21 +32,20 @@ class Channel:
     maximum: float | None = None
 
     def __post_init__(self):
-        if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
-            raise ModelError(f"channel: found the name {self.name!r}, expected a text that can be printed")
-        if not isinstance(self.unit, str):
-            raise ModelError(f"{self.name}: found unit={self.unit!r}, expected a text, as 'm/s', or '1'")
-        dimension(self.unit)  # raises for a text that is no unit
-        if isinstance(self.size, bool) or not isinstance(self.size, (int, np.integer)) or self.size < 1:
-            raise ModelError(f"{self.name}: found size={self.size!r}, expected a whole number of at least 1")
-        for side in ("minimum", "maximum"):
-            value = getattr(self, side)
-            if value is not None and not (isinstance(value, (int, float, np.number)) and not np.isnan(value)):
-                raise ModelError(f"{self.name}: found {side}={value!r}, expected a number, or None for none")
+        place = f"channel {self.name!r}"
+        whole(place, "size", self.size, least=1)
+        for side, value in (("minimum", self.minimum), ("maximum", self.maximum)):
+            if value is not None:
+                number(place, side, value)
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
+            expected = f"expected it below the maximum, {self.maximum:g}"
+            raise ModelError(expected, place=place, found=Given("minimum", self.minimum))
+        if not isinstance(self.name, str) or not self.name.strip() or not self.name.isprintable():
             raise ModelError(
-                f"{self.name}: found minimum={self.minimum:g} above maximum={self.maximum:g}, expected it below"
+                "expected a text that can be printed", place="channel", found=Given("name", self.name)
             )
+        instance(place, "unit", self.unit, str, "a text, as 'm/s', or '1'")
+        dimension(self.unit)  # raises for a text that is no unit
 
     @property
     def elements(self) -> tuple[str, ...]:
@@ -64,8 +64,7 @@ class Declaration(Record):
 
     def __init__(self, channels: Sequence[Channel] = ()):
         for channel in channels:
-            if not isinstance(channel, Channel):
-                raise ModelError(f"declaration: found {channel!r}, expected Channel(name, unit)")
+            instance("declaration", "channels", channel, Channel, "Channel(name, unit)")
         names = [channel.name for channel in channels]
         for name in names:
             if names.count(name) > 1:

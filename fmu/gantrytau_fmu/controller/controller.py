@@ -17,13 +17,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import check_words, number
 from gantrytau.border.refusal import GantryTauError, ModelError, SolveError, did_you_mean
 from gantrytau.interruption import on_interrupt
 from gantrytau_fmu.controller.board import ACTIVATE, STATES, Board, State
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
-from gantrytau_fmu.controller.controller_checks import above_zero, check_kinds, state_of
+from gantrytau_fmu.controller.controller_checks import check_kinds
 from gantrytau_fmu.controller.exchange.remote_client import RemoteClient
 from gantrytau_fmu.controller.exchange.server import Server
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
@@ -71,12 +72,9 @@ class Controller:
         state: State = "obtain",
         patience: float = 10.0,
     ):
-        self.period = above_zero("period", period)
-        if clock not in ("virtual", "wall"):
-            raise ModelError(
-                f"controller: found clock={clock!r}, expected 'virtual' or 'wall'", argument="clock"
-            )
-        patience = above_zero("patience", patience)
+        check_words(Controller, {"clock": clock, "state": state}, "controller")
+        self.period = number("controller", "period", period, above=0.0, unit="s")
+        patience = number("controller", "patience", patience, above=0.0, unit="s")
         self._clock = WallClock(self.period) if clock == "wall" else VirtualClock(self.period, patience)
         check_kinds(dict(limits=limits, references=references, parameters=parameters), kinematics, clients)
         self._plant = SteppedPart("plant", plant, starts)
@@ -86,7 +84,7 @@ class Controller:
         self._law = users_law(controller, wires or {})
         self.tunables, self._tuned = self._all_tunables(parameters or {})
         self._lines = list[ClientLine]()
-        self._state: State = state_of(state)
+        self._state: State = state
         self._coming: State = self._state
         self._changes = PlannedChanges(self.period)
         self._pressed, self._ran, self._wall = 0, False, 0.0
@@ -212,7 +210,7 @@ class Controller:
             raise ModelError(
                 "controller: found a second run, expected one; make another Controller, which begins anew"
             )
-        count = int(above_zero("stop", stop) / self.period + ROUNDING)
+        count = int(number("controller", "stop", stop, above=0.0, unit="s") / self.period + ROUNDING)
         drives, self._ran = self._drives(float(stop)), True
         applied = [Channel(f"applied.{c.name}", c.unit, c.size) for c in self._plant.inputs]
         begin = time.perf_counter()
@@ -223,7 +221,7 @@ class Controller:
                 self._begin(drives, float(stop))
                 ended = self._samples(count, drives, kept)
             except RunEnded as error:
-                ended = error.words
+                ended = error.reason
             except KeyboardInterrupt:  # pressed again, in what did not come back
                 ended = "interrupted"
             except GantryTauError as error:
@@ -371,10 +369,7 @@ class Controller:
             value = self._references.get(channel.name)
             if value is None:
                 value = first[self._plant.inputs.slices[channel.name]]
-            try:
-                found += drives_of(channel.name, value, channel.size, (0.0, stop))
-            except ModelError as error:
-                raise ModelError(_of_references(error), argument="references") from error
+            found += drives_of("references", channel.name, value, channel.size, (0.0, stop))
         return found
 
 
@@ -383,11 +378,7 @@ def _nominal(drives: Sequence[Drive], t: float) -> Values:
     try:
         return np.array([drive(t) for drive in drives])
     except ModelError as error:
-        raise SolveError(_of_references(error), time=t) from error
-
-
-def _of_references(error: ModelError) -> str:
-    return "references " + str(error).removeprefix("inputs ").removeprefix("input ")
+        raise SolveError(str(error), time=t) from error
 
 
 _GROUPS = ("the parameters", "the plant", "the references")

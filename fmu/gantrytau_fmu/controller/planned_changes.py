@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import number
 from gantrytau_fmu.controller.sample_log import SampleLog
 
 Change = Callable[[SampleLog], None]
@@ -29,9 +29,8 @@ class PlannedChanges:
         if at is None:
             self._queue.append(change)
             return
-        if isinstance(at, bool) or not isinstance(at, (int, float, np.number)) or not 0 <= at < np.inf:
-            raise ModelError(f"controller: found at={at!r}, expected a time in s, 0 or later", argument="at")
-        sample = int(np.ceil(at / self._period - ROUNDING))
+        time = number("controller", "at", at, least=0.0, unit="s")
+        sample = int(np.ceil(time / self._period - ROUNDING))
         self._planned = sorted([*self._planned, (sample, change)], key=lambda planned: planned[0])
 
     def act(self, k: int, log: SampleLog) -> None:

@@ -7,15 +7,17 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
+from gantrytau.interruption import uninterrupted
 from gantrytau_fmu.building.platforms import native
-from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
+from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first, fault
 from gantrytau_fmu.reading.inconsistencies import inconsistencies
 from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
 from gantrytau_fmu.reading.safety import unpack
@@ -44,6 +46,7 @@ def check_fmu(
     run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
     no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
     """
+    number("check_fmu", "timeout", timeout, above=0.0, unit="s")
     path = Path(path)
     return [replace(finding, path=str(path)) for finding in errors_first(_found(path, run, timeout))]
 
@@ -52,18 +55,18 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
     try:
         files = read_files(path)
         if problems := schema_problems(files):
-            return [FmuFinding("error", problem) for problem in problems]
+            return [fault(problem) for problem in problems]
         model = model_of(files)
         fmu = describe(files, model)
     except ModelError as error:
-        return [FmuFinding("error", str(error).removeprefix(f"{path}: "))]
+        return [fault(str(error))]
     findings = list(inconsistencies(fmu, files, model))
     for problem in _validated(files.packed(), (variable.name for variable in fmu.variables)):
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
         if not tripped and not problem.startswith(_OURS):
             findings.append(FmuFinding("error", problem))
     if run:
-        findings += _tried(path, native().name in fmu.platforms, timeout)
+        findings += _tried(path, fmu.platforms, timeout)
     return findings
 
 
@@ -83,33 +86,36 @@ def _validated(packed: Any, names: Iterable[str]) -> list[str]:
     return []
 
 
-def _tried(path: Path, here: bool, timeout: float) -> Iterator[FmuFinding]:
+def _tried(path: Path, platforms: Collection[str], timeout: float) -> Iterator[FmuFinding]:
     """What happens when the FMU is run in a process of its own."""
-    if not here:
-        yield FmuFinding("warning", f"not run: it has no binary for this machine ({native().name})")
+    here = native()
+    if here.name not in platforms:
+        yield FmuFinding("warning", f"not run: it has no binary for this machine ({here.name})")
         return
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         report = Path(folder) / "report"
         report.touch()
         unpacked = unpack(path, Path(folder) / "unpacked")
-        code = _run_apart([str(unpacked), str(report)], folder, timeout)
+        arguments = [str(unpacked), str(report), here.suffix, here.folder_2, here.folder_3]
+        code = _run_apart(arguments, folder, timeout)
         stage, findings, finished = _reported(report)
     yield from findings
     if finished:
         return
     if code is None:
-        yield FmuFinding("error", f"{stage}: no answer after {timeout:g} s")
+        yield fault(f"{stage}: no answer after {timeout:g} s")
     else:
-        yield FmuFinding("error", f"{stage}: the process ended ({_ending(code)})")
+        yield fault(f"{stage}: the process ended ({_ending(code)})")
 
 
 def _run_apart(arguments: list[str], folder: str, timeout: float) -> int | None:
     """Run `trial` in a process of its own; its exit code, None if it had to be stopped. No process is left."""
-    command = [sys.executable, "-P", "-m", "gantrytau_fmu.reading.trial", *arguments]
+    command = [sys.executable, "-P", str(Path(__file__).with_name("trial.py")), *arguments]
     silent = subprocess.DEVNULL
-    process = subprocess.Popen(
-        command, cwd=folder, stdin=silent, stdout=silent, stderr=silent, start_new_session=True
-    )
+    with uninterrupted():
+        process = subprocess.Popen(
+            command, cwd=folder, stdin=silent, stdout=silent, stderr=silent, start_new_session=True
+        )
     try:
         return process.wait(timeout)
     except subprocess.TimeoutExpired:

@@ -25,6 +25,11 @@ class FmuFinding(Record):
         )
 
 
+def fault(message: str) -> FmuFinding:
+    """An error."""
+    return FmuFinding("error", message)
+
+
 def errors_first(findings: Iterable[FmuFinding]) -> list[FmuFinding]:
     """The same, errors before warnings before notes."""
     order = ("error", "warning", "note")

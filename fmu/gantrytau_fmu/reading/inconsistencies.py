@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 from gantrytau_fmu.building.platforms import ALIASES, native
 from gantrytau_fmu.description import FmuVariable
 from gantrytau_fmu.reading.fmu_file import FmuFile
-from gantrytau_fmu.reading.fmu_findings import FmuFinding
+from gantrytau_fmu.reading.fmu_findings import FmuFinding, fault
 from gantrytau_fmu.reading.libraries import misplaced
 from gantrytau_fmu.reading.read_fmu import FmuTexts
 
@@ -31,16 +31,14 @@ def inconsistencies(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[FmuFi
 def _header(fmu: FmuFile) -> Iterator[FmuFinding]:
     """Names and numbers of the FMU as a whole."""
     if not fmu.token:
-        yield FmuFinding(
-            "error", "the GUID or instantiation token is empty, expected one to tell versions apart"
-        )
+        yield fault("the GUID or instantiation token is empty, expected one to tell versions apart")
     for interface in fmu.interfaces:
         if interface.capabilities.get("needsExecutionTool"):
             yield FmuFinding(
                 "note", f"{interface.kind} needs the tool {fmu.tool or 'that made it'} on this machine"
             )
     if not fmu.interfaces:
-        yield FmuFinding("error", "it has no interface, expected Model Exchange or Co-Simulation")
+        yield fault("it has no interface, expected Model Exchange or Co-Simulation")
     experiment = fmu.experiment
     if None not in (experiment.start, experiment.stop) and experiment.stop <= experiment.start:  # type: ignore[operator]
         yield FmuFinding(
@@ -49,16 +47,16 @@ def _header(fmu: FmuFile) -> Iterator[FmuFinding]:
         )
     for word, value in (("tolerance", experiment.tolerance), ("step", experiment.step)):
         if value is not None and not 0 < value < math.inf:
-            yield FmuFinding("error", f"default experiment: {word} {value:g}, expected a positive number")
+            yield fault(f"default experiment: {word} {value:g}, expected a positive number")
 
 
 def _values(variable: FmuVariable) -> Iterator[FmuFinding]:
     """Start value, limits and nominal value of a variable."""
     name, least, greatest = variable.name, variable.min, variable.max
     if least is not None and greatest is not None and not least <= greatest:
-        yield FmuFinding("error", f"{name}: min {least:g} is above max {greatest:g}")
+        yield fault(f"{name}: min {least:g} is above max {greatest:g}")
     if variable.nominal is not None and not 0 < variable.nominal < math.inf:
-        yield FmuFinding("error", f"{name}: nominal {variable.nominal:g}, expected a positive number")
+        yield fault(f"{name}: nominal {variable.nominal:g}, expected a positive number")
     starts = variable.start if isinstance(variable.start, tuple) else (variable.start,)
     count = math.prod(variable.shape)
     if (
@@ -67,16 +65,14 @@ def _values(variable: FmuVariable) -> Iterator[FmuFinding]:
         and isinstance(variable.start, tuple)
         and len(starts) not in (1, count)
     ):
-        yield FmuFinding(
-            "error", f"{name}: found {len(starts)} start values, expected {count} or one for all"
-        )
+        yield fault(f"{name}: found {len(starts)} start values, expected {count} or one for all")
     numbers = [value for value in starts if isinstance(value, (int, float)) and not isinstance(value, bool)]
     for value in numbers:
         if not math.isfinite(value):
-            yield FmuFinding("error", f"{name}: start {value:g}, expected a finite number")
+            yield fault(f"{name}: start {value:g}, expected a finite number")
         elif (least is not None and value < least) or (greatest is not None and value > greatest):
             low, high = ("" if limit is None else f"{limit:.9g}" for limit in (least, greatest))
-            yield FmuFinding("error", f"{name}: start {value:.9g} is outside of its limits [{low}, {high}]")
+            yield fault(f"{name}: start {value:.9g} is outside of its limits [{low}, {high}]")
         else:
             continue
         break  # one of an array is enough
@@ -101,11 +97,9 @@ def _units(fmu: FmuFile, model: Any) -> Iterator[FmuFinding]:
     for variable in model.modelVariables:
         own = variable.unit or (variable.declaredType.unit if variable.declaredType else None)
         if variable.displayUnit is not None and own is None:
-            yield FmuFinding(
-                "error", f"{variable.name}: it has the display unit '{variable.displayUnit}' and no unit"
-            )
+            yield fault(f"{variable.name}: it has the display unit '{variable.displayUnit}' and no unit")
     for unit, name in missing.items():
-        yield FmuFinding("error", f"{name}: its unit '{unit}' is not among the UnitDefinitions")
+        yield fault(f"{name}: its unit '{unit}' is not among the UnitDefinitions")
 
 
 def _powers(base: Any) -> dict[str, int]:
@@ -119,13 +113,11 @@ def _structure(fmu: FmuFile, files: FmuTexts, model: Any) -> Iterator[FmuFinding
     own = {variable.name for variable in model.modelVariables if variable.alias is None}
     declared = {variable.name for variable in fmu.variables if variable.causality == "output"} & own
     for name in sorted(declared - set(fmu.outputs)):
-        yield FmuFinding("error", f"{name}: this output is not listed in the ModelStructure")
+        yield fault(f"{name}: this output is not listed in the ModelStructure")
     for name in sorted(set(fmu.outputs) - declared):
-        yield FmuFinding(
-            "error", f"{name}: the ModelStructure lists it as output, but its causality is another"
-        )
+        yield fault(f"{name}: the ModelStructure lists it as output, but its causality is another")
     for name in sorted({name for name in fmu.outputs if fmu.outputs.count(name) > 1}):
-        yield FmuFinding("error", f"{name}: the ModelStructure lists this output more than once")
+        yield fault(f"{name}: the ModelStructure lists this output more than once")
     yield from _initial_unknowns(model)
     if fmu.fmi == "2.0":
         yield from _indices(files, len(model.modelVariables))
@@ -145,13 +137,9 @@ def _initial_unknowns(model: Any) -> Iterator[FmuFinding]:
             continue
         needed = id(variable) in unknown or variable.causality == "calculatedParameter"
         if needed and id(variable) not in listed:
-            yield FmuFinding(
-                "error", f"{variable.name}: the ModelStructure does not list it as initial unknown"
-            )
+            yield fault(f"{variable.name}: the ModelStructure does not list it as initial unknown")
         if not needed and id(variable) in listed:
-            yield FmuFinding(
-                "error", f"{variable.name}: the ModelStructure lists it as initial unknown, but it is none"
-            )
+            yield fault(f"{variable.name}: the ModelStructure lists it as initial unknown, but it is none")
 
 
 def _indices(files: FmuTexts, count: int) -> Iterator[FmuFinding]:
@@ -159,7 +147,7 @@ def _indices(files: FmuTexts, count: int) -> Iterator[FmuFinding]:
     for unknown in ElementTree.fromstring(files.description).iterfind("ModelStructure/*/Unknown"):
         said = [unknown.get("index", ""), *unknown.get("dependencies", "").split()]
         if wrong := [text for text in said if not 1 <= int(text) <= count]:
-            yield FmuFinding("error", f"ModelStructure: found the index {wrong[0]}, expected 1 to {count}")
+            yield fault(f"ModelStructure: found the index {wrong[0]}, expected 1 to {count}")
 
 
 def _indicators(fmu: FmuFile, model: Any) -> Iterator[FmuFinding]:
@@ -167,15 +155,12 @@ def _indicators(fmu: FmuFile, model: Any) -> Iterator[FmuFinding]:
     for unknown in model.eventIndicators:
         variable = fmu.variable(unknown.variable.name)
         if variable.type not in ("Float32", "Float64") or variable.variability != "continuous":
-            yield FmuFinding(
-                "error",
+            yield fault(
                 f"{variable.name}: this event indicator is {variable.variability} {variable.type}, "
-                "expected a continuous number",
+                "expected a continuous number"
             )
         if variable.causality not in ("local", "output"):
-            yield FmuFinding(
-                "error", f"{variable.name}: this event indicator is {variable.causality}, expected local"
-            )
+            yield fault(f"{variable.name}: this event indicator is {variable.causality}, expected local")
 
 
 def _members(fmu: FmuFile) -> Iterator[FmuFinding]:
@@ -184,19 +169,17 @@ def _members(fmu: FmuFile) -> Iterator[FmuFinding]:
     for terminal in fmu.terminals:
         for member, name in terminal.members.items():
             if name not in names:
-                yield FmuFinding(
-                    "error", f"terminal {terminal.name}.{member}: there is no variable '{name}' in this FMU"
-                )
+                yield fault(f"terminal {terminal.name}.{member}: there is no variable '{name}' in this FMU")
 
 
 def _binaries(fmu: FmuFile, files: FmuTexts) -> Iterator[FmuFinding]:
     """What can be run where, and sources that are named and missing."""
     for name in fmu.sources:
         if name not in files.names:
-            yield FmuFinding("error", f"{name}: this source file is named but not in the archive")
+            yield fault(f"{name}: this source file is named but not in the archive")
     here = native().name
     if not fmu.platforms and not fmu.sources:
-        yield FmuFinding("error", "it has neither binaries for all its interfaces nor sources")
+        yield fault("it has neither binaries for all its interfaces nor sources")
     elif here not in fmu.platforms:
         remedy = "it can be compiled from its sources" if fmu.sources else "ask for an export for it"
         yield FmuFinding("warning", f"it has no binary for this machine ({here}); {remedy}")
@@ -204,6 +187,6 @@ def _binaries(fmu: FmuFile, files: FmuTexts) -> Iterator[FmuFinding]:
     for name, head in files.libraries.items():
         _, folder, file = name.split("/")
         if fmu.fmi == "3.0" and folder in ALIASES:
-            yield FmuFinding("error", f"{name}: FMI 3 calls this folder {ALIASES[folder]}")
+            yield fault(f"{name}: FMI 3 calls this folder {ALIASES[folder]}")
         if file.rpartition(".")[0] in identifiers and (problem := misplaced(folder, head)):
-            yield FmuFinding("error", f"{name}: {problem}")
+            yield fault(f"{name}: {problem}")

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.description import (
     C_NAME,
-    Experiment,
+    DefaultExperiment,
     FmuInterface,
     FmuTerminal,
     FmuVariable,
@@ -26,7 +26,7 @@ from gantrytau_fmu.description import (
 )
 from gantrytau_fmu.reading.fmu_file import FmuFile
 from gantrytau_fmu.reading.libraries import HEAD, platforms_of
-from gantrytau_fmu.reading.safety import DESCRIPTION, open_archive
+from gantrytau_fmu.reading.safety import DESCRIPTION, located, open_archive
 
 BUILD = "sources/buildDescription.xml"
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
@@ -74,12 +74,17 @@ def read_fmu(path: str | os.PathLike[str]) -> FmuFile:
     Raises ModelError for an archive that is damaged or unsafe (see `safety.open_archive`), for FMI 1.0 and other
     versions, for a model description that breaks its schema or contradicts itself, and for names that no tool can use.
     """
-    files = read_files(path)
+    with located(path):
+        return _described(read_files(path))
+
+
+def _described(files: FmuTexts) -> FmuFile:
+    """The description in files that keep to their schema; ModelError for others."""
     if problems := schema_problems(files):
         more = f"\n  ... and {len(problems) - _SHOWN} more" if len(problems) > _SHOWN else ""
         listed = "".join(f"\n  {problem}" for problem in problems[:_SHOWN])
         raise ModelError(
-            f"{files.path}: found a {DESCRIPTION} that breaks the schema of FMI {files.fmi}, expected a valid one; "
+            f"found a {DESCRIPTION} that breaks the schema of FMI {files.fmi}, expected a valid one; "
             f"ask its author for another export{listed}{more}"
         )
     return describe(files, model_of(files))
@@ -99,22 +104,22 @@ def read_files(path: str | os.PathLike[str]) -> FmuTexts:
             if name.startswith("binaries/") and name.count("/") == 2 and not name.endswith("/")
         }
     path = Path(path)
-    fmi = _version(path, description)
+    fmi = _version(description)
     return FmuTexts(path, fmi, description, build, terminals, names, libraries, path.stat().st_size, unpacked)
 
 
-def _version(path: Path, description: bytes) -> str:
+def _version(description: bytes) -> str:
     """2.0 or 3.0; ModelError for all else."""
     root = ElementTree.fromstring(description)
     if root.tag != "fmiModelDescription":
         raise ModelError(
-            f"{path}: {DESCRIPTION} begins with '{root.tag}', expected fmiModelDescription; check the file"
+            f"{DESCRIPTION} begins with '{root.tag}', expected fmiModelDescription; check the file"
         )
     version = root.get("fmiVersion", "")
     if version == "2.0" or re.fullmatch(r"3\.0([.-].*)?", version):
         return version[:3]
     remedy = "export it again as FMI 2.0 or 3.0" if version.startswith("1.") else "use one of these versions"
-    raise ModelError(f"{path}: found FMI version '{version}', expected 2.0 or 3.0; {remedy}")
+    raise ModelError(f"found FMI version '{version}', expected 2.0 or 3.0; {remedy}")
 
 
 def schema_problems(files: FmuTexts) -> list[str]:
@@ -147,13 +152,13 @@ def model_of(files: FmuTexts) -> Any:
     """FMPy's `ModelDescription` of an FMU that is valid; ModelError if it contradicts itself."""
     from fmpy.model_description import read_model_description
 
-    with _consistent(files.path):
+    with _consistent():
         model = read_model_description(files.packed(), validate=False)  # type: ignore[arg-type]
-    refuse_names(files.path, model)
+    refuse_names(model)
     return model
 
 
-def refuse_names(path: str | Path, model: Any) -> None:
+def refuse_names(model: Any) -> None:
     """ModelError for a modelIdentifier that is no name in C, and for variables that cannot be told apart.
 
     Binaries are looked up, and sources compiled, under the identifier: a path or a command must not be taken for one.
@@ -163,20 +168,20 @@ def refuse_names(path: str | Path, model: Any) -> None:
         interface = getattr(model, attribute)
         if interface is not None and not C_NAME.fullmatch(interface.modelIdentifier or ""):
             raise ModelError(
-                f"{path}: found the modelIdentifier {interface.modelIdentifier!r} of {kind}, expected a name in C "
+                f"found the modelIdentifier {interface.modelIdentifier!r} of {kind}, expected a name in C "
                 "(letters, digits, '_'); do not run it, and ask its author for another export"
             )
     counts = Counter(variable.name for variable in model.modelVariables)
     twice = [name for name, count in counts.items() if count > 1]
     if twice:
         raise ModelError(
-            f"{path}: found the variable {twice[0]!r} {counts[twice[0]]} times, expected each name once; "
+            f"found the variable {twice[0]!r} {counts[twice[0]]} times, expected each name once; "
             "ask its author for another export"
         )
 
 
 @contextmanager
-def _consistent(path: Path) -> Iterator[None]:
+def _consistent() -> Iterator[None]:
     """Whatever goes wrong when the contents of valid XML are put together, as ModelError."""
     try:
         yield
@@ -189,14 +194,14 @@ def _consistent(path: Path) -> Iterator[None]:
     else:
         return
     raise ModelError(
-        f"{path}: found a {DESCRIPTION} that contradicts itself ({what}), expected a consistent one; "
+        f"found a {DESCRIPTION} that contradicts itself ({what}), expected a consistent one; "
         "ask its author for another export"
     )
 
 
 def describe(files: FmuTexts, model: Any) -> FmuFile:
     """FMPy's description as a record; model: its ModelDescription."""
-    with _consistent(files.path):
+    with _consistent():
         interfaces = tuple(_interfaces(files, model))
         sources = {
             f"sources/{name}"
@@ -315,11 +320,11 @@ def _unknown(unknown: Any) -> Unknown:
     return Unknown(unknown.variable.name, names, tuple(kinds) if kinds else None)
 
 
-def _experiment(found: Any) -> Experiment:
+def _experiment(found: Any) -> DefaultExperiment:
     if found is None:
-        return Experiment(None, None, None, None)
+        return DefaultExperiment(None, None, None, None)
     said = (found.startTime, found.stopTime, found.tolerance, found.stepSize)
-    return Experiment(*(None if text is None else float(text) for text in said))
+    return DefaultExperiment(*(None if text is None else float(text) for text in said))
 
 
 def _platforms(libraries: Mapping[str, bytes], identifiers: set[str]) -> tuple[str, ...]:

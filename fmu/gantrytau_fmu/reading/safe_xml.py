@@ -16,8 +16,8 @@ _ENCODINGS = (
 )  # read alike by all
 
 
-def check_xml(text: bytes, where: str) -> None:
-    """Raise ModelError, which begins with `where`, for XML that is malformed or that could harm its reader.
+def check_xml(text: bytes, place: str) -> None:
+    """Raise ModelError, which begins with `place`, for XML that is malformed or that could harm its reader.
 
     A document type is refused, as with it come entities: files of the machine, and billions of laughs.
     """
@@ -26,12 +26,14 @@ def check_xml(text: bytes, where: str) -> None:
     def declared(version: str, encoding: str | None, standalone: int) -> None:
         if (encoding or "utf-8").lower() not in _ENCODINGS:
             raise ModelError(
-                f"{where}: found the encoding {encoding}, expected UTF-8; export or fetch the file again"
+                f"found the encoding {encoding}, expected UTF-8; export or fetch the file again",
+                place=place,
             )
 
     def typed(*_: object) -> None:
         raise ModelError(
-            f"{where}: found a document type (DTD), expected XML without one; do not trust this file"
+            "found a document type (DTD), expected XML without one; do not trust this file",
+            place=place,
         )
 
     def begun(*_: object) -> None:
@@ -39,7 +41,8 @@ def check_xml(text: bytes, where: str) -> None:
         depth += 1
         if depth > _DEPTH:
             raise ModelError(
-                f"{where}: found elements {depth} deep, expected no more than {_DEPTH}; export or fetch the file again"
+                f"found elements {depth} deep, expected no more than {_DEPTH}; export or fetch the file again",
+                place=place,
             )
 
     def ended(_: object) -> None:
@@ -55,5 +58,6 @@ def check_xml(text: bytes, where: str) -> None:
         parser.Parse(text, True)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise ModelError(
-            f"{where}: found no proper XML ({error}), expected a well-formed file; export or fetch the file again"
+            f"found no proper XML ({error}), expected a well-formed file; export or fetch the file again",
+            place=place,
         ) from error

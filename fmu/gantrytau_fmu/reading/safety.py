@@ -58,10 +58,9 @@ _BROKEN = (  # what Python raises for archives that are not what they should be
 class Archive:
     """An archive whose directory has been checked, open while the context of `open_archive` lasts.
 
-    path: the file; names: of its members, folders left out; size: bytes of all members.
+    names: of its members, folders left out; size: bytes of all members.
     """
 
-    path: Path
     names: tuple[str, ...]
     size: int
     _zip: zipfile.ZipFile = field(repr=False)
@@ -69,25 +68,23 @@ class Archive:
     def read(self, name: str, limit: int = UNPACKED) -> bytes:
         """A member whole. ModelError if it is not there, damaged, or has more than `limit` bytes."""
         if name not in self.names:
-            raise ModelError(f"{self.path}: there is no '{name}' in it, expected one; {_AGAIN}")
+            raise ModelError(f"there is no '{name}' in it, expected one; {_AGAIN}")
         found = bytearray()
         for chunk in self.chunks(name):
             found += chunk
             if len(found) > limit:
-                raise ModelError(
-                    f"{self.path}: '{name}' has more than {limit:,} bytes, expected no more; it is not read"
-                )
+                raise ModelError(f"'{name}' has more than {limit:,} bytes, expected no more; it is not read")
         return bytes(found)
 
     def xml(self, name: str) -> bytes:
         """A member that is XML without a document type. ModelError if it is damaged, too large, or something else."""
         text = self.read(name, XML)
-        check_xml(text, f"{self.path}: '{name}'")
+        check_xml(text, f"'{name}'")
         return text
 
     def chunks(self, name: str) -> Iterator[bytes]:
         """A member piece by piece. ModelError if it is damaged."""
-        with _translated(self.path, f"member '{name}'"), self._zip.open(name) as member:
+        with _translated(f"member '{name}'"), self._zip.open(name) as member:
             while chunk := member.read(_CHUNK):
                 yield chunk
 
@@ -111,7 +108,7 @@ class Archive:
 
     def _counted(self, count: int, chunk: bytes) -> int:
         if count + len(chunk) > UNPACKED:
-            raise ModelError(_too_large(self.path, count + len(chunk)))
+            raise ModelError(_too_large(count + len(chunk)))
         return count + len(chunk)
 
 
@@ -125,17 +122,18 @@ def open_archive(
 
     Raises ModelError for a file that is not there, no zip archive, damaged, encrypted or cut off; for members with
     unsafe or doubtful names, links, more than 5,000 entries, more than 200 MB; and if `needs` is not among them.
+    `located` names the file in it.
     """
     path = Path(path)
     if not path.is_file():
-        raise ModelError(no_file(path))
+        raise ModelError(_no_file(path))
     with _opened(path, "SSP" if needs.endswith(".ssd") else "FMU") as archive:
         infos = archive.infolist()
-        _check_directory(path, infos)
-        _check_count(path, archive, len(infos))
+        _check_directory(infos)
+        _check_count(archive, len(infos))
         names = tuple(info.filename for info in infos if not info.is_dir())
-        _check_content(path, names, needs)
-        found = Archive(path, names, sum(info.file_size for info in infos), archive)
+        _check_content(names, needs)
+        found = Archive(names, sum(info.file_size for info in infos), archive)
         if verify:
             found.verify()
         yield found
@@ -144,10 +142,18 @@ def open_archive(
 def unpack(path: str | os.PathLike[str], folder: str | os.PathLike[str], needs: str = DESCRIPTION) -> Path:
     """Unpack an FMU (or with another `needs` an SSP) into a folder, which is new or empty; the folder.
 
+    Raises ModelError as `extract`, which names the file.
+    """
+    with located(path):
+        return extract(path, Path(folder), needs)
+
+
+def extract(path: str | os.PathLike[str], folder: Path, needs: str = DESCRIPTION) -> Path:
+    """As `unpack`, but its errors leave it to `located` to name the file.
+
     Raises ModelError as `open_archive`, for a folder that holds something, and if it cannot be written.
     Whatever ends the unpacking early, nothing of it is left.
     """
-    folder = Path(folder)
     with open_archive(path, needs, verify=False) as archive:
         existed = folder.is_dir()
         try:
@@ -168,6 +174,15 @@ def unpack(path: str | os.PathLike[str], folder: str | os.PathLike[str], needs: 
     return folder
 
 
+@contextmanager
+def located(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Errors inside name the file that they are of."""
+    try:
+        yield
+    except ModelError as error:
+        raise error.within(os.fspath(path)) from error
+
+
 class _Guarded(BufferedReader):
     """A file that is not read in large pieces: Python reads the directory of an archive whole."""
 
@@ -183,19 +198,19 @@ def _opened(path: Path, what: str) -> Iterator[zipfile.ZipFile]:
     try:
         file = _Guarded(FileIO(path))
     except OSError as error:
-        raise ModelError(f"{path}: cannot be read ({error.strerror}); check its permissions") from error
+        raise ModelError(f"cannot be read ({error.strerror}); check its permissions") from error
     with file:
         size = os.fstat(file.fileno()).st_size
         if size == 0:
-            raise ModelError(f"{path}: found an empty file, expected a zip archive; {_AGAIN}")
+            raise ModelError(f"found an empty file, expected a zip archive; {_AGAIN}")
         if size > UNPACKED + _DIRECTORY + MEMBERS * 128:
-            raise ModelError(_too_large(path, size))
+            raise ModelError(_too_large(size))
         if not zipfile.is_zipfile(file) and not _MAGIC.startswith(head := _head(file)):
             raise ModelError(
-                f"{path}: found the beginning '{_letters(head)}', expected '{_letters(_MAGIC)}': this is no ZIP "
+                f"found the beginning '{_letters(head)}', expected '{_letters(_MAGIC)}': this is no ZIP "
                 f"archive, so no {what}; check that it is the right file"
             )
-        with _translated(path, "directory"):
+        with _translated("directory"):
             archive = zipfile.ZipFile(file)
         with archive:
             yield archive
@@ -207,33 +222,33 @@ def _head(file: BufferedReader) -> bytes:
 
 
 @contextmanager
-def _translated(path: Path, what: str) -> Iterator[None]:
+def _translated(what: str) -> Iterator[None]:
     """What Python says of a damaged archive as ModelError."""
     try:
         yield
     except _BROKEN as error:
         words = str(error) or type(error).__name__
         raise ModelError(
-            f"{path}: found a damaged {what} ({words}), expected a sound zip archive; {_AGAIN}"
+            f"found a damaged {what} ({words}), expected a sound zip archive; {_AGAIN}"
         ) from error
 
 
-def _check_directory(path: Path, infos: list[zipfile.ZipInfo]) -> None:
+def _check_directory(infos: list[zipfile.ZipInfo]) -> None:
     """ModelError for what the directory of an archive says and must not say."""
     if len(infos) > MEMBERS:
         raise ModelError(
-            f"{path}: found {len(infos):,} entries, expected at most {MEMBERS:,}; "
+            f"found {len(infos):,} entries, expected at most {MEMBERS:,}; "
             "unpack it yourself if you trust it, and leave out what is not needed"
         )
     for info in infos:
         if wrong := _wrong_name(info.orig_filename) or _wrong_name(info.filename) or _wrong_kind(info):
-            raise ModelError(f"{path}: member {_shown(info.orig_filename)} {wrong}; do not trust this file")
+            raise ModelError(f"member {_shown(info.orig_filename)} {wrong}; do not trust this file")
     if (size := sum(info.file_size for info in infos)) > UNPACKED:
-        raise ModelError(_too_large(path, size))
-    _check_places(path, infos)
+        raise ModelError(_too_large(size))
+    _check_places(infos)
 
 
-def _check_count(path: Path, archive: zipfile.ZipFile, count: int) -> None:
+def _check_count(archive: zipfile.ZipFile, count: int) -> None:
     """ModelError unless the end of the file counts as many entries as were found: damage can hide some."""
     file = archive.fp
     assert file is not None
@@ -242,9 +257,7 @@ def _check_count(path: Path, archive: zipfile.ZipFile, count: int) -> None:
     place = end.rfind(b"PK\5\6")
     (told,) = struct.unpack_from("<H", end, place + 10)
     if told not in (count, 0xFFFF):  # the latter where an extension tells it
-        raise ModelError(
-            f"{path}: found {count} entries where its end tells of {told}, expected as many; {_AGAIN}"
-        )
+        raise ModelError(f"found {count} entries where its end tells of {told}, expected as many; {_AGAIN}")
 
 
 def _wrong_name(name: str) -> str:
@@ -284,7 +297,7 @@ def _wrong_kind(info: zipfile.ZipInfo) -> str:
     return ""
 
 
-def _check_places(path: Path, infos: list[zipfile.ZipInfo]) -> None:
+def _check_places(infos: list[zipfile.ZipInfo]) -> None:
     """ModelError for two members at one place, of the unpacked folder or of the file itself."""
     folders: dict[str, str] = {}
     files: dict[str, str] = {}
@@ -294,7 +307,7 @@ def _check_places(path: Path, infos: list[zipfile.ZipInfo]) -> None:
             folders[_folded(name)] = name
         elif (first := files.setdefault(_folded(name), name)) != name:
             raise ModelError(
-                f"{path}: '{first}' and '{name}' differ only in case, expected names that all systems tell apart; "
+                f"'{first}' and '{name}' differ only in case, expected names that all systems tell apart; "
                 "rename one of them"
             )
         for end in range(len(name)):
@@ -303,15 +316,15 @@ def _check_places(path: Path, infos: list[zipfile.ZipInfo]) -> None:
     if len(files) < sum(not info.is_dir() for info in infos):
         names = [info.filename for info in infos]
         twice = next(name for name in names if names.count(name) > 1)
-        raise ModelError(f"{path}: found '{twice}' twice, expected each member once; do not trust this file")
+        raise ModelError(f"found '{twice}' twice, expected each member once; do not trust this file")
     if both := files.keys() & folders.keys():
         name = files[min(both)]
-        raise ModelError(f"{path}: found '{name}' as file and as folder, expected one of them; {_AGAIN}")
+        raise ModelError(f"found '{name}' as file and as folder, expected one of them; {_AGAIN}")
     end = 0  # of the member before: bombs let many members share the same bytes
     for info in sorted(infos, key=lambda info: info.header_offset):
         if info.header_offset < end:
             raise ModelError(
-                f"{path}: member {_shown(info.filename)} overlaps another one, expected members side by side; "
+                f"member {_shown(info.filename)} overlaps another one, expected members side by side; "
                 "do not trust this file"
             )
         end = info.header_offset + _HEADER + info.compress_size
@@ -322,7 +335,7 @@ def _folded(name: str) -> str:
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name.strip("/")).casefold())
 
 
-def _check_content(path: Path, names: tuple[str, ...], needs: str) -> None:
+def _check_content(names: tuple[str, ...], needs: str) -> None:
     """ModelError unless the archive holds what makes it an FMU or an SSP."""
     if needs in names:
         return
@@ -333,21 +346,25 @@ def _check_content(path: Path, names: tuple[str, ...], needs: str) -> None:
         )
     else:
         remedy = "check that it is the right file"
-    raise ModelError(f"{path}: found no {needs} in it, expected one at the top; {remedy}")
+    raise ModelError(f"found no {needs} in it, expected one at the top; {remedy}")
 
 
 def no_file(path: Path) -> str:
     """That there is no file of this name, with the nearest one as a question."""
+    return f"{path}: {_no_file(path)}"
+
+
+def _no_file(path: Path) -> str:
     if path.exists():
         what = "folder" if path.is_dir() else "special file"
-        return f"{path}: found a {what} of this name, expected a file; check the path"
+        return f"found a {what} of this name, expected a file; check the path"
     there = sorted(file.name for file in path.parent.glob(f"*{path.suffix}") if file.is_file())
-    return f"{path}: found no such file, expected an archive{did_you_mean(path.name, there)}"
+    return f"found no such file, expected an archive{did_you_mean(path.name, there)}"
 
 
-def _too_large(path: Path, size: int) -> str:
+def _too_large(size: int) -> str:
     return (
-        f"{path}: found {size / 1e6:,.0f} MB or more, expected at most {UNPACKED / 1e6:,.0f} MB unpacked; "
+        f"found {size / 1e6:,.0f} MB or more, expected at most {UNPACKED / 1e6:,.0f} MB unpacked; "
         "unpack it yourself if you trust it, and leave out what is not needed"
     )
 

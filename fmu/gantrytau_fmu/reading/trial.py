@@ -1,7 +1,8 @@
-"""A few steps of an FMU, to be run as a process of its own: `python -m gantrytau_fmu.reading.trial FOLDER REPORT`.
+"""A few steps of an FMU, to be run as a process of its own: `python trial.py FOLDER REPORT SUFFIX FOLDER_2 FOLDER_3`.
 
-FOLDER holds the unpacked FMU. Each line of REPORT is JSON: the stage that begins, something found, or the end. The
-stage is written before each call into the binary, so that a crash or a hang tells where it was.
+FOLDER holds the unpacked FMU, SUFFIX and the folders below `binaries` in both versions are those of this platform. Each
+line of REPORT is JSON: the stage that begins, something found, or the end. The stage is written before each call into the
+binary, so that a crash or a hang tells where it was. It imports nothing of the toolkit, and so begins at once.
 """
 
 import ctypes
@@ -14,8 +15,6 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-from gantrytau_fmu.building.platforms import native
 
 STEPS = 10
 EVENTS = 100  # iterations of one event
@@ -59,8 +58,8 @@ class Journal:
             self.messages.append(text.decode(errors="replace").strip()[:300])
 
 
-def main(folder: Path, journal: Journal) -> None:
-    """Try each interface that the FMU has."""
+def main(folder: Path, journal: Journal, platform: Sequence[str]) -> None:
+    """Try each interface that the FMU has; platform: suffix and folders of its binaries."""
     journal.stage("reading the model description")
     from fmpy import read_model_description
 
@@ -71,7 +70,7 @@ def main(folder: Path, journal: Journal) -> None:
             continue
         journal.interface = _WORDS[kind]
         try:
-            fmu = _loaded(folder, model, kind, interface.modelIdentifier, journal)
+            fmu = _loaded(folder, model, kind, interface.modelIdentifier, journal, platform)
             _instantiate(fmu, model, journal)
             attempt(fmu, model, journal)
             fmu.terminate()
@@ -83,16 +82,16 @@ def main(folder: Path, journal: Journal) -> None:
         journal.found("note", "not run: only the other interfaces are")
 
 
-def _loaded(folder: Path, model: Any, kind: str, identifier: str, journal: Journal) -> Any:
+def _loaded(
+    folder: Path, model: Any, kind: str, identifier: str, journal: Journal, platform: Sequence[str]
+) -> Any:
     """The library, all functions of the interface in it; each call is told to the journal."""
-    here, two = native(), model.fmiVersion == "2.0"
+    (suffix, *folders), two = platform, model.fmiVersion == "2.0"
     journal.stage("loading the binary")
     module = import_module("fmpy.fmi2" if two else "fmpy.fmi3")
     prefix = "fmi2" if two else "fmi3"
     made = getattr(module, f"FMU{prefix[-1]}{'Model' if kind == 'ModelExchange' else 'Slave'}")
-    places = [
-        folder / "binaries" / name / f"{identifier}{here.suffix}" for name in (here.folder_2, here.folder_3)
-    ]
+    places = [folder / "binaries" / name / f"{identifier}{suffix}" for name in folders]
     library = next((place for place in (places if two else places[::-1]) if place.is_file()), places[0])
     found = ctypes.CDLL(str(library))
     needed = [name for name in dir(made) if name.startswith(prefix)]
@@ -306,5 +305,5 @@ if __name__ == "__main__":
         limits = import_module("resource")
         limits.setrlimit(limits.RLIMIT_CORE, (0, 0))
     report = Journal(Path(sys.argv[2]))
-    main(Path(sys.argv[1]), report)
+    main(Path(sys.argv[1]), report, sys.argv[3:])
     report.write(finished=True)

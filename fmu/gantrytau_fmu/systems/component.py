@@ -10,6 +10,7 @@ from typing import Any, Literal
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.results.series import split_element
 from gantrytau_fmu.reading.read_fmu import refuse_names
+from gantrytau_fmu.reading.safety import located
 
 KINDS = {"Real": "real", "Float64": "real", "Float32": "real", "Boolean": "boolean", "String": "text"}
 SETTABLE = ("parameter", "structuralParameter", "input", "output", "local")
@@ -51,7 +52,7 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Component:
-    """An unpacked FMU with Co-Simulation, under its name in a system.
+    """An unpacked FMU with Co-Simulation, under its name in a system; "" for one that is alone.
 
     file: what the user named; folder: where it is unpacked; version: 2 or 3; library: the binary for this platform;
     feedthrough: output -> the inputs it depends on within one instant; units: name -> exponents of kg, m, s, A, K,
@@ -75,6 +76,11 @@ class Component:
     stop: float | None = None
     step: float | None = None
 
+    @property
+    def title(self) -> str:
+        """What messages call it: its name in the system, or its file where it is alone and has none."""
+        return self.name or Path(self.file).name
+
     def expand(self, name: str, causality: str = "") -> tuple[str, ...]:
         """The scalars that a name stands for: itself, or the elements of a vector in their order; ModelError if none.
 
@@ -88,7 +94,7 @@ class Component:
             if element and element[0] == name:
                 found.append((element[1], scalar))
         if not found:
-            raise ModelError(f"{self.name} has no variable '{name}'{self._proposed(name, causality)}")
+            raise ModelError(f"{self.title} has no variable '{name}'{self._proposed(name, causality)}")
         return tuple(scalar for _, scalar in sorted(found))
 
     def of(self, *causalities: str) -> tuple[str, ...]:
@@ -117,6 +123,11 @@ class Component:
         return proposed.replace("; there is", f"; its {causality}s are") if causality else proposed
 
 
+def dotted(owner: str, name: str) -> str:
+    """A variable by its name in a system: 'component.variable', of a component without a name its own."""
+    return f"{owner}.{name}" if owner else name
+
+
 def numeric(scalar: Scalar) -> bool:
     """Whether a variable has a number as its value."""
     return scalar.kind in ("real", "integer", "boolean")
@@ -138,7 +149,7 @@ def read_component(
     if interface is None:
         other = "without --me" if kind == "model-exchange" else "with --me, which integrates Model Exchange"
         raise ModelError(
-            f"{name}: {file} has no interface for {kind}, expected one; export it with that, "
+            f"{_titled(name, file)} has no interface for {kind}, expected one; export it with that, "
             f"or run it alone with `gantrytau fmu run` {other}"
         )
     version = description.fmiMajorVersion
@@ -182,7 +193,8 @@ def _description(file: str | Path, folder: Path) -> Any:
         raise ModelError(
             f"{file}: found FMI {description.fmiVersion}, expected 2.0 or 3.0; export it again from its tool"
         )
-    refuse_names(file, description)
+    with located(file):
+        refuse_names(description)
     return description
 
 
@@ -256,9 +268,13 @@ def _library(name: str, file: str | Path, folder: Path, version: int, identifier
     binaries = folder / "binaries"
     there = sorted(entry.name for entry in binaries.iterdir()) if binaries.is_dir() else []
     raise ModelError(
-        f"{name}: {file} has binaries for {', '.join(there) or 'no platform'}, expected {folders[0]}; "
+        f"{_titled(name, file)} has binaries for {', '.join(there) or 'no platform'}, expected {folders[0]}; "
         "export it for this platform, or compile its sources"
     )
+
+
+def _titled(name: str, file: str | Path) -> str:
+    return f"{name}: {file}" if name else str(file)
 
 
 def _number(text: Any) -> float | None:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from gantrytau.border.dimensions import BASE, dimension
-from gantrytau.border.refusal import ModelError, did_you_mean
-from gantrytau_fmu.systems.component import Component, Scalar, numeric
-from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
+from gantrytau_fmu.systems.component import Component, Scalar, dotted, numeric
+from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units, wrong
 
 SHOWN, FEW = 6, 5  # names that a message lists, and with their values
 KILOGRAM_FIRST = ("kg", "m", "s", "A", "K", "mol", "cd")  # the order of FMI
@@ -70,12 +70,12 @@ def build_system(
     drives = _drives(components, inputs, span)
     taken: dict[Place, str] = {}
     for target, by in [
-        *((link.target, ".".join(link.source)) for link in links),
+        *((link.target, dotted(*link.source)) for link in links),
         *((place, "inputs") for place in drives),
     ]:
         if target in taken:
             raise ModelError(
-                f"{'.'.join(target)} is driven by {taken[target]} and by {by}, expected one of them; "
+                f"{dotted(*target)} is driven by {taken[target]} and by {by}, expected one of them; "
                 "leave the other one out"
             )
         taken[target] = by
@@ -86,7 +86,7 @@ def unconnected(system: ConnectedSystem) -> dict[str, str]:
     """Inputs that are numbers and that nothing drives, whose start nobody chose, by dotted name: the values they keep."""
     driven = {link.target for link in system.links} | set(system.drives)
     return {
-        f"{owner}.{name}": _shown(component.scalars[name].start)
+        dotted(owner, name): _shown(component.scalars[name].start)
         for owner, component in system.components.items()
         for name in component.of("input")
         if (owner, name) not in driven and name not in system.start[owner]
@@ -123,14 +123,14 @@ def locate(components: Mapping[str, Component], name: str, causality: str = "") 
     """
     if not isinstance(name, str):
         raise ModelError(f"found {name!r}, expected a name as 'component.variable'")
-    owners = [owner for owner in components if name.startswith(f"{owner}.")]
+    owners = [owner for owner in components if name.startswith(dotted(owner, ""))]
     if not owners:
         choice = list(components)
         raise ModelError(
             f"'{name}' begins with no component of the system{did_you_mean(name.partition('.')[0], choice)}"
         )
     owner = max(owners, key=len)
-    return [(owner, scalar) for scalar in components[owner].expand(name[len(owner) + 1 :], causality)]
+    return [(owner, scalar) for scalar in components[owner].expand(name[len(dotted(owner, "")) :], causality)]
 
 
 def _links(
@@ -221,15 +221,15 @@ def _starts(
         scalars = [components[owner].scalars[scalar] for owner, scalar in places]
         if len(scalars) == 1 and scalars[0].kind == "text":
             if not isinstance(value, str):
-                raise ModelError(f"start {name}: found {value!r}, expected a text", argument="start")
+                raise wrong("start", name, f"found {value!r}, expected a text")
             values: Sequence[float | str] = [value]
         else:
             value = without_units("start", name, value, scalars[0].unit)
             values = numbers_of("start", name, value, len(places))
         for (owner, scalar), known, number in zip(places, scalars, values, strict=True):
             if not known.has_start:
-                raise ModelError(_calculated(components[owner], known), argument="start")
-            _check_start(f"{owner}.{scalar}", known, number)
+                raise wrong("start", dotted(owner, scalar), _calculated(components[owner], known))
+            _check_start(dotted(owner, scalar), known, number)
             found[owner][scalar] = number
     return found
 
@@ -241,14 +241,12 @@ def _places_to_start(components: Mapping[str, Component], name: str, value: Any)
     except ModelError as error:
         short = name.removesuffix(".start") if isinstance(name, str) else name
         if short == name:
-            raise ModelError(f"start {name}: {error}", argument="start") from error
+            raise wrong("start", name, str(error)) from error
         try:
             locate(components, short)
         except ModelError:
-            raise ModelError(f"start {name}: {error}", argument="start") from error
-        raise ModelError(
-            f"start {name}: found no such variable; in an FMU it is called {short!r}", argument="start"
-        ) from None
+            raise wrong("start", name, str(error)) from error
+        raise wrong("start", name, f"found no such variable; in an FMU it is called {short!r}") from None
 
 
 def _calculated(component: Component, scalar: Scalar) -> str:
@@ -261,29 +259,25 @@ def _calculated(component: Component, scalar: Scalar) -> str:
     more = ", ..." if len(free) > SHOWN else ""
     words = f"such as {', '.join(free[:SHOWN])}{more}" if free else "of which this FMU has none"
     return (
-        f"start {component.name}.{scalar.name} is a {scalar.variability} {scalar.causality} that is calculated, "
+        f"a {scalar.variability} {scalar.causality} that is calculated, "
         f"expected a parameter, an input, or a state or other variable with a start value, {words}"
     )
 
 
 def _check_start(path: str, scalar: Scalar, value: float | str) -> None:
     if not (numeric(scalar) or scalar.kind == "text") or scalar.causality == "structuralParameter":
-        raise ModelError(
-            f"start {path}: a {scalar.causality} of type {scalar.type} cannot be set here", argument="start"
-        )
+        raise wrong("start", path, f"a {scalar.causality} of type {scalar.type} cannot be set here")
     if isinstance(value, str):
         return
     if scalar.kind == "integer" and value != round(value):
-        raise ModelError(f"start {path}: found {value!r}, expected a whole number", argument="start")
+        raise wrong("start", path, f"found {value!r}, expected a whole number")
     low, high = scalar.min, scalar.max
     if (low is not None and value < low) or (high is not None and value > high):
         sides = (("at least", low), ("at most", high))
         limits = " and ".join(f"{words} {side:.9g}" for words, side in sides if side is not None)
         unit = f" {scalar.unit}" if scalar.unit not in ("", "1") else ""
-        raise ModelError(
-            f"start {path}: found {value:.9g}, expected {limits}{unit}, as its FMU says; choose such a value",
-            argument="start",
-        )
+        expected = f"expected {limits}{unit}, as its FMU says; choose such a value"
+        raise wrong("start", path, f"found {value:.9g}, {expected}")
 
 
 def _drives(
@@ -294,17 +288,14 @@ def _drives(
         try:
             places = locate(components, name, "input")
         except ModelError as error:
-            raise ModelError(f"inputs {name}: {error}", argument="inputs") from error
+            raise wrong("inputs", name, str(error)) from error
         for owner, scalar in places:
             causality = components[owner].scalars[scalar].causality
             if causality != "input" or not numeric(components[owner].scalars[scalar]):
-                raise ModelError(
-                    f"inputs {name}: found {_article(causality)}, expected an input that is a number; "
-                    "parameters are set with start=",
-                    argument="inputs",
-                )
+                expected = f"found {_article(causality)}, expected an input that is a number; parameters are set with "
+                raise wrong("inputs", name, expected, Given("start"))
         value = without_units("inputs", name, value, components[places[0][0]].scalars[places[0][1]].unit)
-        drives = drives_of(name, value, len(places), span)
+        drives = drives_of("inputs", name, value, len(places), span)
         found.update(zip(places, drives, strict=True))
     return found
 

@@ -8,11 +8,16 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Samples
-from gantrytau.border.refusal import USERS_ERRORS, ModelError
+from gantrytau.border.refusal import USERS_ERRORS, Given, ModelError
 from gantrytau.border.units import given, scale
 from gantrytau.inputs.input_signal import with_course
 
 ROUNDINGS = 16  # of a time: a knot that is nearer to the end of a step stands there
+
+
+def wrong(argument: str, name: str, *parts: str | Given) -> ModelError:
+    """What is wrong with a value that an argument has for a name."""
+    return ModelError(*parts, place=f"{argument}: {name}", argument=argument)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +52,21 @@ def between(knots: np.ndarray, begin: float, size: float) -> list[tuple[float, f
     return [(low, high - low) for low, high in pairwise(times)]
 
 
-def drives_of(name: str, value: Any, count: int, span: tuple[float, float]) -> list[Drive]:
-    """What drives the elements of an input.
+def drives_of(argument: str, name: str, value: Any, count: int, span: tuple[float, float]) -> list[Drive]:
+    """What drives the elements of an input, given as `argument`.
 
     value: number, array, function of time, Samples, (times, values) or a signal; span: begin and stop in s, which samples
     have to cover. Raises ModelError for what is none of these.
     """
-    course = with_course(name, value, (count,) if count > 1 else (), lambda: span)
-    if callable(course):
-        return _functions(name, course, count, span[0])
+    try:
+        course = with_course(name, value, (count,) if count > 1 else (), lambda: span)
+    except ModelError as error:
+        raise error.within(argument) from error
     if isinstance(course, Samples):
-        return _samples(name, course, count, span)
-    return [Drive(lambda t, x=number: x) for number in numbers_of("inputs", name, course, count)]
+        return _samples(f"{argument}: {name}", course, count, span)
+    if callable(course):
+        return _functions(argument, name, course, count, span[0])
+    return [Drive(lambda t, x=number: x) for number in numbers_of(argument, name, course, count)]
 
 
 def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
@@ -72,22 +80,19 @@ def without_units(argument: str, name: str, value: Any, unit: str) -> Any:
     )
     if samples is None and not texts:
         return value
-    place = f"{argument} {name}"
     try:
         own = scale(unit) if unit else None
     except ModelError:
-        raise ModelError(
-            f"{place}: found {value!r}, expected numbers in '{unit}', the unit of this FMU; convert them",
-            argument=argument,
-        ) from None
+        expected = f"expected numbers in '{unit}', the unit of this FMU; convert them"
+        raise wrong(argument, name, f"found {value!r}, {expected}") from None
     coherent = None if own is None else unit if own.slope == 1.0 and not own.zero else own.coherent
     try:
         if samples is None:
-            found = given(place, value, coherent)
+            found = given(name, value, coherent)
             return found if own is None else own.written(np.asarray(found, dtype=float))
-        samples.check_unit(place, coherent)
+        samples.check_unit(name, coherent)
     except ModelError as error:
-        raise ModelError(str(error), argument=argument) from None
+        raise ModelError(str(error), place=argument, argument=argument) from None
     values = samples.values if own is None else own.written(samples.values)
     shaped = values.reshape(samples.times.size, *samples.shape, order="F")
     return Samples(samples.times, shaped, kind=samples.kind, largest_gap=samples.largest_gap)
@@ -98,40 +103,37 @@ def numbers_of(argument: str, name: str, value: Any, count: int) -> list[float]:
     try:
         numbers = np.asarray(value, dtype=float).ravel()
     except (TypeError, ValueError):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected a number or an array", argument=argument
-        ) from None
+        raise wrong(argument, name, f"found {value!r}, expected a number or an array") from None
     if numbers.size != count or not np.all(np.isfinite(numbers)):
-        raise ModelError(
-            f"{argument} {name}: found {value!r}, expected {count} finite number{'s' * (count > 1)}",
-            argument=argument,
-        )
+        expected = f"expected {count} finite number{'s' * (count > 1)}"
+        raise wrong(argument, name, f"found {value!r}, {expected}")
     return [float(number) for number in numbers]
 
 
-def _functions(name: str, function: Callable[[float], Any], count: int, begin: float) -> list[Drive]:
+def _functions(
+    argument: str, name: str, function: Callable[[float], Any], count: int, begin: float
+) -> list[Drive]:
     """A function for each element, tried at the beginning."""
-    _value(name, function, begin, count)
-    return [Drive(lambda t, k=k: _value(name, function, t, count)[k]) for k in range(count)]
+
+    def value(t: float) -> list[float]:
+        try:
+            found = function(t)
+        except USERS_ERRORS as error:  # whatever a function of the user raises
+            failed = f"the function failed at t = {t:.6g} s with {type(error).__name__}: {error}"
+            raise wrong(
+                argument, name, f"{failed}; expected a value at every time of the simulation"
+            ) from error
+        return numbers_of(argument, f"{name} at t = {t:.6g} s", found, count)
+
+    value(begin)
+    return [Drive(lambda t, k=k: value(t)[k]) for k in range(count)]
 
 
-def _value(name: str, function: Callable[[float], Any], t: float, count: int) -> list[float]:
-    try:
-        value = function(t)
-    except USERS_ERRORS as error:  # whatever a function of the user raises
-        raise ModelError(
-            f"inputs {name}: the function failed at t = {t:.6g} s with {type(error).__name__}: {error}; expected a value "
-            "at every time of the simulation",
-            argument="inputs",
-        ) from error
-    return numbers_of("inputs", f"{name} at t = {t:.6g} s", value, count)
-
-
-def _samples(name: str, samples: Samples, count: int, span: tuple[float, float]) -> list[Drive]:
+def _samples(place: str, samples: Samples, count: int, span: tuple[float, float]) -> list[Drive]:
     """Columns of samples; those of a matrix in the order of its elements, row after row."""
     if len(samples.shape) == 1 or samples.values.shape[1] != count:
-        samples.check_shape(f"input {name}", (count,) if count > 1 else ())
-    samples.check_cover(f"input {name}", *span)
+        samples.check_shape(place, (count,) if count > 1 else ())
+    samples.check_cover(place, *span)
     order = np.arange(count).reshape(*reversed(samples.shape)).T.ravel()
     held = samples.kind == "constant"
     return [

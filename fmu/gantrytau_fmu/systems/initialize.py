@@ -11,109 +11,110 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau.border.refusal import InitializationError, SolveError
-from gantrytau_fmu.systems.master import Master
+from gantrytau_fmu.systems.component import dotted
+from gantrytau_fmu.systems.master import RunningSystem
 
 AGREEMENT = 1e-10  # relative to the largest of both values, and to one unit near zero
 PERTURBATION = 1e-6  # relative; the error of a difference is near that of its rounding, 1e-10
 ROUNDS, HALVINGS = 30, 12
 
 
-def initialize(master: Master) -> None:
+def initialize(running: RunningSystem) -> None:
     """Carry outputs to inputs until they agree; InitializationError with `.residuals` if they do not."""
     try:
-        master.read()
-        for _ in range(len(master.parts) + 2):
-            if not _carry(master):
+        running.read()
+        for _ in range(len(running.parts) + 2):
+            if not _carry(running):
                 return
-        _newton(master)
+        _newton(running)
     except SolveError as error:
         if isinstance(error, InitializationError):
             raise
         raise InitializationError(f"{error} (while the system was initialised)") from error
 
 
-def _carry(master: Master) -> bool:
+def _carry(running: RunningSystem) -> bool:
     """One round in the order of the sequence; whether anything changed."""
-    before = {name: list(values) for name, values in master.values.items()}
-    for name in master.sequence:
-        if master.known[name]:
-            _put(master, name, master.inputs(name, master.grid.begin))
-    pairs = [(np.array(master.values[name]), np.array(before[name])) for name in master.parts]
+    before = {name: list(values) for name, values in running.values.items()}
+    for name in running.sequence:
+        if running.known[name]:
+            _put(running, name, running.inputs(name, running.grid.begin))
+    pairs = [(np.array(running.values[name]), np.array(before[name])) for name in running.parts]
     return any(np.any(abs(new - old) > AGREEMENT * _scale(new, old)) for new, old in pairs)
 
 
-def _put(master: Master, name: str, inputs: Sequence[float]) -> None:
+def _put(running: RunningSystem, name: str, inputs: Sequence[float]) -> None:
     """Set the inputs of a component and read what follows."""
-    part = master.parts[name]
-    part.set(master.known[name], inputs)
-    master.values[name] = part.get(master.wanted[name])
-    master.check(name, master.grid.begin)
+    part = running.parts[name]
+    part.set(running.known[name], inputs)
+    running.values[name] = part.get(running.wanted[name])
+    running.check(name, running.grid.begin)
 
 
-def _newton(master: Master) -> None:
-    u = _targets(master)
+def _newton(running: RunningSystem) -> None:
+    u = _targets(running)
     for _ in range(ROUNDS):
-        residual = _residual(master, u)
+        residual = _residual(running, u)
         if np.all(abs(residual) <= AGREEMENT * _scale(u, u + residual)):
-            _carry(master)
+            _carry(running)
             return
-        jacobian = _jacobian(master, u, residual)
+        jacobian = _jacobian(running, u, residual)
         try:
             change = np.linalg.solve(jacobian, -residual)
         except np.linalg.LinAlgError:
             break
-        u = _damped(master, u, change, residual)
-    raise _unsolved(master, u)
+        u = _damped(running, u, change, residual)
+    raise _unsolved(running, u)
 
 
-def _damped(master: Master, u: np.ndarray, change: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _damped(running: RunningSystem, u: np.ndarray, change: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """The longest of the halved Newton steps that makes the residual smaller; the shortest if none does."""
     scale = _scale(u, u + residual)
     trial = u
     for halving in range(HALVINGS):
         trial = u + change / 2**halving
-        if np.max(abs(_residual(master, trial)) / scale) < np.max(abs(residual) / scale):
+        if np.max(abs(_residual(running, trial)) / scale) < np.max(abs(residual) / scale):
             break
     return trial
 
 
-def _targets(master: Master) -> np.ndarray:
+def _targets(running: RunningSystem) -> np.ndarray:
     """What drives the inputs of all components, one after the other."""
-    begin = master.grid.begin
-    return np.array([value for name in master.parts for value in master.inputs(name, begin)])
+    begin = running.grid.begin
+    return np.array([value for name in running.parts for value in running.inputs(name, begin)])
 
 
-def _residual(master: Master, u: np.ndarray) -> np.ndarray:
+def _residual(running: RunningSystem, u: np.ndarray) -> np.ndarray:
     place = 0
-    for name in master.parts:
-        count = len(master.known[name])
+    for name in running.parts:
+        count = len(running.known[name])
         if count:
-            _put(master, name, u[place : place + count].tolist())
+            _put(running, name, u[place : place + count].tolist())
         place += count
-    return _targets(master) - u
+    return _targets(running) - u
 
 
-def _jacobian(master: Master, u: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _jacobian(running: RunningSystem, u: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """dr/du by differences; each input changes the outputs of its own component only."""
-    _residual(master, u)
+    _residual(running, u)
     jacobian = np.empty((u.size, u.size))
     first = 0
-    for name in master.parts:
-        count = len(master.known[name])
+    for name in running.parts:
+        count = len(running.known[name])
         for column in range(first, first + count):
             moved = u.copy()
             moved[column] += PERTURBATION * max(1.0, abs(u[column]))
-            _put(master, name, moved[first : first + count].tolist())
-            jacobian[:, column] = (_targets(master) - moved - residual) / (moved[column] - u[column])
+            _put(running, name, moved[first : first + count].tolist())
+            jacobian[:, column] = (_targets(running) - moved - residual) / (moved[column] - u[column])
         if count:
-            _put(master, name, u[first : first + count].tolist())
+            _put(running, name, u[first : first + count].tolist())
         first += count
     return jacobian
 
 
-def _unsolved(master: Master, u: np.ndarray) -> InitializationError:
-    names = [f"{name}.{scalar}" for name in master.parts for scalar in master.known[name]]
-    residuals = dict(zip(names, map(float, _residual(master, u)), strict=True))
+def _unsolved(running: RunningSystem, u: np.ndarray) -> InitializationError:
+    names = [dotted(name, scalar) for name in running.parts for scalar in running.known[name]]
+    residuals = dict(zip(names, map(float, _residual(running, u)), strict=True))
     worst = sorted(residuals, key=lambda name: -abs(residuals[name]))[:6]
     words = ", ".join(f"{name} differs by {residuals[name]:.4g}" for name in worst if residuals[name])
     return InitializationError(

@@ -1,27 +1,26 @@
 """A component in a process of its own: if its binary crashes or hangs, only that process is lost.
 
-Parent and child exchange pickles, each after its length, over the child's standard input and output, which the child
-takes away from the FMU first. What the FMU prints appears on standard error.
+Parent and child call each other over a pipe of `multiprocessing.connection`. The child has no standard input, and what
+the FMU prints appears on standard error.
 """
 
 import os
-import pickle
-import queue
 import signal
-import struct
 import subprocess
 import sys
-import threading
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, BinaryIO
+from multiprocessing import Pipe
+from typing import Any
 
 from gantrytau.border.refusal import GantryTauError, InitializationError, SolveError
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.slave import Slave
 
-_START = "import sys; sys.path[:] = {path!r}; from gantrytau_fmu.systems.isolation import serve; serve()"
-_LENGTH = struct.Struct("<Q")
+# a plain process: one of `multiprocessing` would import the user's script once more
+_START = (
+    "import sys; sys.path[:] = {path!r}; from gantrytau_fmu.systems.isolation import serve; serve({handle})"
+)
 FAREWELL = 5.0  # s for the process to end by itself
 
 
@@ -30,12 +29,9 @@ class Isolated:
 
     def __init__(self, component: Component, timeout: float):
         self.component, self.timeout, self.time, self.running = component, timeout, 0.0, False
-        path = [entry or os.getcwd() for entry in sys.path]
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(path=path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        )
-        self.answers: queue.Queue[Any] = queue.Queue()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self.line, childs = Pipe()
+        with childs:
+            self.process = _started(childs.fileno())
         try:
             self._ask("Slave", component)
         except BaseException:
@@ -92,23 +88,20 @@ class Isolated:
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         try:
-            _write(self.process.stdin, (call, arguments))
-            answer = self.answers.get(timeout=self.timeout)
-        except queue.Empty:
-            self.process.kill()
-            raise self._lost(call, f"did not answer within {self.timeout:g} s and was stopped") from None
-        except OSError:
-            answer = None
-        if answer is None:
-            raise self._lost(call, f"crashed ({self._how()})")
-        good, value = answer
+            self.line.send((call, arguments))
+            if not self.line.poll(self.timeout):
+                self.process.kill()
+                raise self._lost(call, f"did not answer within {self.timeout:g} s and was stopped")
+            good, value = self.line.recv()
+        except (OSError, EOFError):
+            raise self._lost(call, f"crashed ({self._how()})") from None
         if not good:
             raise value
         return value
 
     def _lost(self, call: str, words: str) -> GantryTauError:
         message = (
-            f"{self.component.name}: the process of {self.component.file} {words} in the call '{call}' "
+            f"{self.component.title}: the process of {self.component.file} {words} in the call '{call}' "
             f"at t = {self.time:.6g} s; `gantrytau fmu check --run` looks for the reason"
         )
         if self.running:
@@ -124,17 +117,8 @@ class Isolated:
                 return signal.Signals(-code).name
         return f"exit code {code}"
 
-    def _listen(self) -> None:
-        """Carry answers from the pipe to the queue; None when the process has gone."""
-        with suppress(OSError, EOFError, ValueError):
-            while True:
-                self.answers.put(_read(self.process.stdout))
-        self.answers.put(None)
-
     def _end(self) -> None:
-        with suppress(OSError):
-            if self.process.stdin:
-                self.process.stdin.close()
+        self.line.close()
         try:
             self.process.wait(FAREWELL)
         except subprocess.TimeoutExpired:
@@ -142,16 +126,27 @@ class Isolated:
             self.process.wait()
 
 
-def serve() -> None:
+def _started(handle: int) -> "subprocess.Popen[bytes]":
+    """The child, which inherits its end of the pipe and nothing else."""
+    path = [entry or os.getcwd() for entry in sys.path]
+    command = [sys.executable, "-c", _START.format(path=path, handle=handle)]
+    if sys.platform == "win32":
+        os.set_handle_inheritable(handle, True)
+        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=2, close_fds=False)
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=2, pass_fds=[handle])
+
+
+def serve(handle: int) -> None:
     """The child: answer calls until the parent hangs up."""
+    if sys.platform == "win32":
+        from multiprocessing.connection import PipeConnection as Connection
+    else:
+        from multiprocessing.connection import Connection
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the parent, which ends this process
-    source, sink = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    os.dup2(2, 1)
     slave: Any = None
-    with suppress(EOFError, OSError):
+    with suppress(EOFError, OSError), Connection(handle) as line:
         while True:
-            call, arguments = _read(source)
+            call, arguments = line.recv()
             try:
                 if call == "Slave":
                     slave, value = Slave(*arguments), None
@@ -160,27 +155,10 @@ def serve() -> None:
                 answer = (True, value)
             except Exception as error:
                 answer = (False, _plain(error))
-            _write(sink, answer)
+            line.send(answer)
 
 
 def _plain(error: Exception) -> Exception:
     """The error without what cannot be carried over."""
     error.__cause__ = error.__context__ = None
     return error if isinstance(error, GantryTauError) else GantryTauError(f"{type(error).__name__}: {error}")
-
-
-def _write(stream: BinaryIO | Any, value: Any) -> None:
-    text = pickle.dumps(value)
-    stream.write(_LENGTH.pack(len(text)) + text)
-    stream.flush()
-
-
-def _read(stream: BinaryIO | Any) -> Any:
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        raise EOFError
-    (length,) = _LENGTH.unpack(head)
-    text = stream.read(length)
-    if len(text) < length:
-        raise EOFError
-    return pickle.loads(text)

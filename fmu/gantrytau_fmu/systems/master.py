@@ -9,13 +9,16 @@ In Gauss-Seidel one that stands before all faster ones steps when its interval b
 answer until it ends), the others when the faster ones have come to its end.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError, SolveError
+from gantrytau.border.checks import check_words, number, whole
+from gantrytau.border.refusal import Given, ModelError, SolveError, did_you_mean
+from gantrytau.describing.record import Record
+from gantrytau_fmu.systems.component import dotted
 from gantrytau_fmu.systems.connected_system import ConnectedSystem
 from gantrytau_fmu.systems.drives import Drive, between, knots_of
 from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
@@ -23,6 +26,48 @@ from gantrytau_fmu.systems.step_order import is_sampled, takes_samples
 Order = Literal["gauss-seidel", "jacobi", "iterate"]
 ORDERS: tuple[str, ...] = get_args(Order)
 SMALL = 1e-6  # magnitude below which agreement is absolute: noise around zero never agrees relatively
+
+
+@dataclass(frozen=True)
+class Master(Record):
+    """The master algorithm of a co-simulation: in which order components step, how often, and where they run.
+
+    order: "gauss-seidel": one after the other, by step_order.py or in a `sequence`; "jacobi": all with what was known at
+        the last point; "iterate": steps are repeated from saved states until every input is the mean of the output that
+        drives it at both ends of the step, within `agreement` (relative), in at most `iterations`.
+    steps: component -> its own step, s, a multiple or a fraction of the communication step; what others give it is held
+        in between.
+    tolerance: relative, handed to the components; models are integrated with it (1e-6).
+    error_estimate: simulate again with half the steps and add 'error(a.y)' = 2 |y(step) - y(step / 2)|, which is the
+        error of the result to first order in the step.
+    isolate: components (True: all) in processes of their own, where a crash or a call longer than `timeout`, s, is an error.
+    progress: called with the time reached; by default a bar on the terminal when it takes long.
+    """
+
+    order: Order = "gauss-seidel"
+    sequence: Sequence[str] | None = None
+    steps: Mapping[str, float] | None = None
+    agreement: float = 1e-8
+    iterations: int = 50
+    tolerance: float | None = None
+    error_estimate: bool = False
+    isolate: Sequence[str] | bool = ()
+    timeout: float = 60.0
+    progress: Callable[[float], None] | None = None
+
+    def __post_init__(self):
+        check_words(Master, vars(self))
+        number("Master", "agreement", self.agreement, above=0.0, below=1.0)
+        whole("Master", "iterations", self.iterations, least=1)
+        if self.tolerance is not None:
+            number("Master", "tolerance", self.tolerance, above=0.0, below=1.0)
+        number("Master", "timeout", self.timeout, above=0.0, unit="s")
+
+    def isolated(self, components: Collection[str]) -> tuple[str, ...]:
+        """The components that run in processes of their own."""
+        if isinstance(self.isolate, bool):
+            return tuple(components) if self.isolate else ()
+        return tuple(self.isolate)
 
 
 class RunningComponent(Protocol):
@@ -66,6 +111,18 @@ class Grid:
         return (last - first) * self.step
 
 
+def check_times(place: str, begin: float, stop: float, step: float) -> None:
+    """ModelError unless begin < stop and 0 < step <= stop - begin."""
+    if not stop > begin:
+        expected = f"expected a time after the beginning at {begin:g} s; choose a later one"
+        raise ModelError(expected, place=place, found=Given("stop", stop))
+    if not 0 < step <= (stop - begin) * (1 + 1e-9):
+        expected = (
+            f"expected more than 0 and at most the {stop - begin:g} s that are simulated; choose such a step"
+        )
+        raise ModelError(expected, place=place, found=Given("step", step))
+
+
 def make_grid(begin: float, stop: float, step: float) -> Grid:
     """The points from begin to stop; the last interval is shorter if the step does not divide the span."""
     ratio = (stop - begin) / step
@@ -94,7 +151,7 @@ class _Feed:
     drive: Drive | None = None
 
 
-class Master:
+class RunningSystem:
     """The running components of a system, with the values that they exchange.
 
     wanted: names of each component to be read at every point; those that drive others are added.
@@ -138,24 +195,25 @@ class Master:
             self.values[name] = part.get(self.wanted[name])
             self.check(name, self.grid.begin)
 
-    def advance(self, k: int, order: Order, agreement: float, iterations: int) -> None:
+    def advance(self, k: int, master: Master) -> None:
         """From point k to k + 1."""
-        if order == "jacobi":
+        if master.order == "jacobi":
             self._jacobi(k)
-        elif order == "gauss-seidel":
+        elif master.order == "gauss-seidel":
             self._gauss_seidel(k)
         else:
-            self._iterate(k, agreement, iterations)
+            self._iterate(k, master.agreement, master.iterations)
 
     def check(self, name: str, time: float) -> None:
         """SolveError if a component gave values that are not finite."""
         if all(map(np.isfinite, self.values[name])):
             return
         pairs = zip(self.wanted[name], self.values[name], strict=True)
-        bad = [f"{name}.{scalar} = {value}" for scalar, value in pairs if not np.isfinite(value)]
+        bad = [f"{dotted(name, scalar)} = {value}" for scalar, value in pairs if not np.isfinite(value)]
         raise SolveError(
-            f"{name}: found {', '.join(bad[:6])} at t = {time:.6g} s, expected finite values; take a shorter step, "
-            "or look at what drives this component",
+            f"found {', '.join(bad[:6])} at t = {time:.6g} s, expected finite values; take a shorter step, or look at "
+            "what drives this component",
+            place=self.system.components[name].title,
             time=time,
         )
 
@@ -291,26 +349,34 @@ class Master:
             scale = np.maximum(self.largest.get(name, SMALL), np.maximum(abs(old), abs(new)))
             self.largest[name] = scale
             place = int(np.argmax(abs(new - old) / scale))
-            words = f"{name}.{self.known[name][place]} was {old[place]:.6g}, is {new[place]:.6g}"
+            words = f"{dotted(name, self.known[name][place])} was {old[place]:.6g}, is {new[place]:.6g}"
             found.append((float(abs(new - old)[place] / scale[place]), words))
         worst = max(found, default=(0.0, ""))
         return worst[1] if worst[0] > agreement else ""
 
 
-def paces_of(system: ConnectedSystem, step: float, steps: Mapping[str, Any]) -> dict[str, Pace]:
+def paces_of(system: ConnectedSystem, step: float, steps: Mapping[str, Any] | None) -> dict[str, Pace]:
     """How often each component steps; ModelError for steps that are no multiple and no fraction of `step`."""
     found = {name: Pace() for name in system.components}
-    for name, own in steps.items():
+    for name, own in (steps or {}).items():
         if name not in found:
-            raise ModelError(f"steps: there is no component '{name}'; there is {', '.join(found)}")
-        good = isinstance(own, (int, float, np.number)) and np.isfinite(own) and own > 0
-        ratio = float(own) / step if good else 0.0
-        if good and ratio >= 1 and abs(ratio - round(ratio)) < 1e-9 * ratio:
-            found[name] = Pace(multiple=round(ratio))
-        elif good and ratio < 1 and abs(1 / ratio - round(1 / ratio)) < 1e-9 / ratio:
-            found[name] = Pace(parts=round(1 / ratio))
+            raise no_component("steps", name, found)
+        ratio = number(f"Master: steps {name}", "steps", own, above=0.0, unit="s") / step
+        multiple, parts = round(ratio), round(1 / ratio)
+        if abs(ratio - multiple) < 1e-9 * ratio:
+            found[name] = Pace(multiple=multiple)
+        elif abs(1 / ratio - parts) < 1e-9 / ratio:
+            found[name] = Pace(parts=parts)
         else:
             raise ModelError(
-                f"steps: {name} has {own!r} s, expected a whole multiple or fraction of the step of {step:g} s"
+                f"steps: {name} has {own!r} s, expected a whole multiple or fraction of the step of {step:g} s",
+                place="Master",
+                argument="steps",
             )
     return found
+
+
+def no_component(argument: str, name: Any, components: Collection[str]) -> ModelError:
+    """That an argument of the master names a component that is not there."""
+    words = f"{argument}: there is no component '{name}'{did_you_mean(str(name), components)}"
+    return ModelError(words, place="Master", argument=argument)

@@ -30,7 +30,7 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
     outputs = component.of("output", "input")
     if any(component.scalars[name].size > 1 for name in outputs):
         raise ModelError(
-            f"{component.file}: arrays of FMI 3 are not supported with Model Exchange; run its Co-Simulation"
+            f"{component.title}: arrays of FMI 3 are not supported with Model Exchange; run its Co-Simulation"
         )
     table = _inputs(component, system, grid)
     pressed: list[bool] = []
@@ -67,10 +67,10 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
             hook_log()
     if not pressed:
         early = found["time"][-1] < grid.stop - 1e-6 * grid.step  # FMPy stops where the FMU asks for it
-        return _result(component, outputs, found, ended_in_words(log, component.name) if early else "stop")
+        return _result(component, outputs, found, ended_in_words(log, component.title) if early else "stop")
     result = _result(component, outputs, found)
     stopped = SolveError(
-        f"{component.file}: the integration was interrupted at t = {result.time[-1]:.4g} s; "
+        f"{component.title}: the integration was interrupted at t = {result.time[-1]:.4g} s; "
         ".result holds what was computed",
         time=float(result.time[-1]),
         result=result,
@@ -87,7 +87,7 @@ def _failure(
     said = f"; its log says: {' | '.join(line.strip() for line in log[-LAST:])}" if log else ""
     when = f" after t = {time:.6g} s" if time is not None else ""
     return SolveError(
-        f"{component.file}: the integration failed{when}: {error}{said}; try a smaller tolerance or Co-Simulation",
+        f"{component.title}: the integration failed{when}: {error}{said}; try a smaller tolerance or Co-Simulation",
         time=time,
         result=partial,
     )
@@ -124,8 +124,8 @@ def _check_knots(component: Component, knots: np.ndarray) -> None:
     if near.size:
         t = float(knots[near[0]])
         raise ModelError(
-            f"{component.file}: samples at t = {t:.9g} s and {np.diff(knots)[near[0]]:.3g} s later are one instant to FMPy, "
-            f"which integrates Model Exchange; run Co-Simulation, or leave more than {SAME:g} of the time between them",
+            f"{component.title}: samples at t = {t:.9g} s and {np.diff(knots)[near[0]]:.3g} s later are one instant to "
+            f"FMPy, which integrates Model Exchange; run Co-Simulation, or leave more than {SAME:g} of the time between",
             argument="inputs",
         )
 

@@ -1,21 +1,20 @@
 """One FMU of any tool, simulated by itself: Co-Simulation, or Model Exchange with FMPy's CVode."""
 
 import os
-import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gantrytau.border.refusal import GantryTauError, ModelError, SolveError
+from gantrytau.border.checks import number
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.inputs.input_signal import with_seeds
 from gantrytau.results.result import Result
 from gantrytau_fmu.reading.safety import unpack
-from gantrytau_fmu.systems.component import read_component
+from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import build_system, unconnected, warn_of
-from gantrytau_fmu.systems.cosimulate import check_times, cosimulate
-from gantrytau_fmu.systems.master import make_grid
+from gantrytau_fmu.systems.cosimulate import run_system
+from gantrytau_fmu.systems.master import Grid, Master, check_times, make_grid
 from gantrytau_fmu.systems.model_exchange import integrate
 
 STEPS = 500  # where neither the caller nor the file says a step
@@ -41,56 +40,43 @@ def run_fmu(
     output times; isolate: run it in a process of its own. Raises what `cosimulate` raises, and warns likewise of
     inputs that nothing drives.
     """
+    times = {
+        name: None if value is None else number("run_fmu", name, value, unit="s")
+        for name, value in (("stop", stop), ("step", step))
+    }
+    master = Master(tolerance=tolerance, isolate=isolate, progress=progress)
+    driven = with_seeds(inputs or {}, seed)
     if model_exchange and isolate:
-        raise ModelError(f"{path}: Model Exchange runs in this process, found isolate; leave one of them out")
-    kind = "model-exchange" if model_exchange else "co-simulation"
-    name = Path(path).name  # of the component, so that messages name the file
-    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder, _plain(name):
-        place = unpack(path, Path(folder) / "fmu")
-        component = read_component(name, name, place, kind)
-        stop = component.stop if stop is None else stop
-        if stop is None:
-            raise ModelError(
-                f"{path}: found no stop time, in the file neither; expected one in s, as stop=1.0",
-                argument="stop",
-            )
-        if step is None:
-            check_times(0.0, stop, stop)
-            step = min(component.step or stop / STEPS, stop)
-        check_times(0.0, stop, step)
-        starts = {f"{name}.{variable}": value for variable, value in (start or {}).items()}
-        signals = {f"{name}.{variable}": value for variable, value in with_seeds(inputs or {}, seed).items()}
-        system = build_system({name: component}, (), starts, signals, (0.0, stop))
-        free = {free.removeprefix(f"{name}."): value for free, value in unconnected(system).items()}
-        warn_of(free, stacklevel=2)
+        raise ModelError(
+            "Model Exchange runs in this process, found ",
+            Given("isolate", True),
+            "; leave one of them out",
+            place="run_fmu",
+        )
+    with tempfile.TemporaryDirectory(prefix="fmu-", ignore_cleanup_errors=True) as folder:
+        unpacked = unpack(path, Path(folder) / "fmu")
+        component = read_component(
+            "", os.fspath(path), unpacked, "model-exchange" if model_exchange else "co-simulation"
+        )
+        grid = _grid(component, times["stop"], times["step"])
+        system = build_system({"": component}, (), start or {}, driven, (0.0, grid.stop))
+        warn_of(unconnected(system), stacklevel=2)
         if model_exchange:
-            return integrate(component, system, make_grid(0.0, stop, step), tolerance)
-    policy: dict[str, Any] = dict(stop=stop, step=step, start=starts, inputs=signals, tolerance=tolerance)
-    with _plain(name):
-        found = cosimulate({name: path}, **policy, isolate=[name] if isolate else (), progress=progress)
-    return _bare(found, name)
+            return integrate(component, system, grid, tolerance)
+        return run_system(system, master, grid, {"": path})
 
 
-@contextmanager
-def _plain(name: str) -> Iterator[None]:
-    """Messages and partial results in which variables have no prefix."""
-    try:
-        yield
-    except GantryTauError as error:
-        error.args = (re.sub(rf"(?<![\w./\\]){re.escape(name)}\.(?=\S)", "", str(error)),)
-        if isinstance(error, SolveError) and error.result is not None:
-            error.result = _bare(error.result, name)
-        raise
-
-
-def _bare(result: Result, name: str) -> Result:
-    """The result with names that do not begin with that of the component."""
-    names = {full.removeprefix(f"{name}."): full for full in result.names}
-    return Result(
-        result.time,
-        {short: result[full] for short, full in names.items()},
-        units={short: result.unit(full) for short, full in names.items()},
-        descriptions={short: result.description(full) for short, full in names.items()},
-        title=Path(name).stem,
-        ended=result.ended,
-    )
+def _grid(component: Component, stop: float | None, step: float | None) -> Grid:
+    """The points of the output; what is not given is as the file says. ModelError for times that do not fit."""
+    stop = component.stop if stop is None else stop
+    if stop is None:
+        raise ModelError(
+            "found no stop time, in the file neither; expected one in s, as ",
+            Given("stop", 1.0),
+            place=component.title,
+            argument="stop",
+        )
+    if step is None:
+        step = min(component.step or stop / STEPS, stop)
+    check_times("run_fmu", 0.0, stop, step)
+    return make_grid(0.0, stop, step)

@@ -25,14 +25,14 @@ Values = Sequence[float]
 
 
 class RunEnded(GantryTauError):
-    """A component, `owner`, asks to end the run: when, s, in which words, and the values it has then."""
+    """A component, `owner`, asks to end the run: when, s, for which reason, and the values it has then."""
 
-    def __init__(self, owner: str, time: float, words: str, values: Values):
-        super().__init__(f"{owner}: {words}")
-        self.owner, self.time, self.words, self.values = owner, time, words, list(values)
+    def __init__(self, owner: str, time: float, reason: str, values: Values):
+        super().__init__(reason, place=owner)
+        self.owner, self.time, self.reason, self.values = owner, time, reason, list(values)
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return RunEnded, (self.owner, self.time, self.words, self.values)
+        return RunEnded, (self.owner, self.time, self.reason, self.values)
 
 
 _TYPES_2 = {
@@ -125,7 +125,7 @@ class Slave:
         found = self.get(wanted)
         if ended is not None:
             name = self.component.name
-            raise RunEnded(name, ended, ended_in_words(self.log, name), found)
+            raise RunEnded(name, ended, ended_in_words(self.log, self.component.title), found)
         return found
 
     def _stepped(self, time: float, size: float) -> float | None:
@@ -179,7 +179,7 @@ class Slave:
             self.fmu.component = None
             _LOGS.pop(id(self), None)
             raise InitializationError(
-                f"{self.component.name}: {self.component.file} could not be instantiated{self._said()}; "
+                f"{self.component.title}: {self.component.file} could not be instantiated{self._said()}; "
                 "`gantrytau fmu check --run` looks for the reason"
             ) from error
         chosen = [name for name in ERRORS if name in self.component.categories]
@@ -221,7 +221,7 @@ class Slave:
 
     def _failure(self, words: str) -> SolveError | InitializationError:
         message = (
-            f"{self.component.name}: {words} at t = {self.time:.6g} s{self._said()}; {self._remedy(words)}"
+            f"{self.component.title}: {words} at t = {self.time:.6g} s{self._said()}; {self._remedy(words)}"
         )
         if self.running:
             return SolveError(message, time=self.time)
@@ -311,7 +311,7 @@ def _loaded(component: Component) -> Any:
         guid=component.token,
         unzipDirectory=component.folder,
         modelIdentifier=component.identifier,
-        instanceName=component.name,
+        instanceName=component.title,
     )
     try:
         if component.version == 2:
@@ -319,7 +319,7 @@ def _loaded(component: Component) -> Any:
         return FMU3Slave(**arguments)
     except Exception as error:
         raise ModelError(
-            f"{component.name}: the binary in {component.file} cannot be used: {error}; "
+            f"{component.title}: the binary in {component.file} cannot be used: {error}; "
             "it may need libraries that are missing here, `gantrytau fmu check` says more"
         ) from error
 

@@ -12,7 +12,7 @@ In each group a component comes after those that drive it; a loop is cut where t
 
 from collections.abc import Collection, Sequence
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, SignalLink
 
@@ -61,11 +61,10 @@ def _downstream(names: Sequence[str], links: Sequence[SignalLink]) -> list[str]:
 
 
 def _checked(given: tuple[str, ...], components: Collection[str]) -> tuple[str, ...]:
-    for name in given:
-        if name not in components:
-            raise ModelError(f"sequence: there is no component '{name}'{did_you_mean(str(name), components)}")
-    if sorted(given) != sorted(components):
+    if sorted(map(str, given)) != sorted(components):
         raise ModelError(
-            f"sequence: found {', '.join(given)}, expected each component once: {', '.join(components)}"
+            f"expected each component once: {', '.join(components)}",
+            place="Master",
+            found=Given("sequence", given),
         )
     return given

@@ -207,10 +207,7 @@ def _functions(
     strata: Strata, pieces: Mapping[str, tuple[Cut, list[ca.SX]]], *, by_value: bool
 ) -> dict[str, ca.Function]:
     """The pieces as functions of what is known and the parameters; by_value: right where pivots vanish, too."""
-    found = {
-        name: cut.function(name, expressions, by_value=by_value)
-        for name, (cut, expressions) in pieces.items()
-    }
+    found = {name: cut.function(name, e, by_value=by_value) for name, (cut, e) in pieces.items()}
     n = len(strata.roles["T"])
     for name in ("constraints", "balance"):
         if found[name].size1_out(0) != n:
@@ -238,13 +235,13 @@ def _call(function: ca.Function, values: Mapping[str, Any]) -> Any:
     return function(*(values[k] for k in function.name_in()))
 
 
-def _slope(function: ca.Function, kind: str, at: Mapping[str, Any]) -> Any:
+def _derivative(function: ca.Function, kind: str, at: Mapping[str, Any]) -> Any:
     """Derivative by one argument at rest, where the others are zero but for positions and parameters."""
     rest = {k: type(at["T"]).zeros(*at[k].shape) for k in EVERYTHING}
     rest |= {k: at[k] for k in ("T", "q", "p")}
-    slope = ca.jacobian(_call(function, {**rest, kind: at[kind]}), at[kind])
+    found = ca.jacobian(_call(function, {**rest, kind: at[kind]}), at[kind])
     # what it is multiplied with enters the equations linearly
-    return ca.densify(ca.substitute(slope, at[kind], rest[kind]))
+    return ca.densify(ca.substitute(found, at[kind], rest[kind]))
 
 
 def _systems(
@@ -252,7 +249,7 @@ def _systems(
 ) -> dict[str, Any]:
     """The four systems as expressions of T, q, their rates and p; weights: K where it is constant."""
     balance, zeros = functions["balance"], {k: type(at["T"]).zeros(*at[k].shape) for k in EVERYTHING}
-    inverse, S = _slope(functions["speeds"], "dT", at), -_slope(balance, "f", at)
+    inverse, S = _derivative(functions["speeds"], "dT", at), -_derivative(balance, "f", at)
     K = ca.solve(S.T, inverse).T if weights is None else weights
     G = K @ _call(balance, {**zeros, **{k: at[k] for k in ("T", "q", "p")}})
     moving = _call(balance, {**zeros, **{k: at[k] for k in ("T", "q", "dT", "dq", "p")}})
@@ -260,8 +257,8 @@ def _systems(
         "constraints": _call(functions["constraints"], at),
         "velocity_jacobian": inverse,
         "accelerations": _call(functions["accelerations"], at),
-        "M1": K @ _slope(balance, "ddT", at),
-        "M2": K @ _slope(balance, "ddq", at),
+        "M1": K @ _derivative(balance, "ddT", at),
+        "M2": K @ _derivative(balance, "ddq", at),
         "G": G,
         "bias": K @ moving - G,
     }
@@ -271,9 +268,11 @@ def _weights(strata: Strata, functions: Mapping[str, ca.Function]) -> ca.DM | No
     """K of K S = J^-T if it is constant near the start, else None; StructureError where J^-1 or S is singular there."""
     kind = ca.SX if _written_out(functions) else ca.MX
     at = {k: kind.sym(k, len(strata.names(k))) for k in EVERYTHING} | {"p": strata.numbers}
-    inverse, balance = _slope(functions["speeds"], "dT", at), functions["balance"]
-    inertia = _slope(balance, "ddT", at) + _slope(balance, "ddq", at) @ inverse
-    function = ca.Function("slopes", [at["T"], at["q"]], [inverse, -_slope(balance, "f", at), inertia])
+    inverse, balance = _derivative(functions["speeds"], "dT", at), functions["balance"]
+    inertia = _derivative(balance, "ddT", at) + _derivative(balance, "ddq", at) @ inverse
+    function = ca.Function(
+        "jacobians", [at["T"], at["q"]], [inverse, -_derivative(balance, "f", at), inertia]
+    )
     start = np.concatenate([strata.start("T"), strata.start("q")])
     steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (POINTS, start.size))
     _require_regular(strata, *(np.array(m) for m in function(*np.split(start, 2))))

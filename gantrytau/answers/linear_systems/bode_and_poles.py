@@ -8,32 +8,18 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from gantrytau.answers.linear_systems.poles_and_zeros import in_s
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.results.figures import check_suffix, finished
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from gantrytau.answers.linear_systems.linear_system import LinearSystem
+
 MOST = 16  # pairs of inputs and outputs that one figure still shows
 POINTS = 2000
-
-
-class Drawn(Protocol):
-    """What is drawn of a linear system."""
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    period: float | None
-
-    @property
-    def title(self) -> str: ...
-    @property
-    def poles(self) -> np.ndarray: ...
-    @property
-    def zeros(self) -> np.ndarray: ...
-    def unit(self, name: str) -> str: ...
-    def response(self, frequencies: Any) -> np.ndarray: ...
 
 
 class Spectrum(Protocol):
@@ -45,7 +31,7 @@ class Spectrum(Protocol):
     def response(self) -> np.ndarray: ...
 
 
-def frequencies_to_draw(system: Drawn) -> np.ndarray:
+def frequencies_to_draw(system: "LinearSystem") -> np.ndarray:
     """Frequencies in Hz, (N,), from a tenth of the slowest pole or zero to ten times the fastest, dense at resonances."""
     corners = np.concatenate([in_s(system.poles, system.period), in_s(system.zeros, system.period)])
     corners = corners[np.isfinite(corners)]
@@ -75,28 +61,24 @@ class Curves:
 
 
 def beside_each_other(
-    system: Drawn, verb: str, beside: Mapping[str, Any] | None, spectra: bool = False
+    system: "LinearSystem", verb: str, beside: Mapping[str, Any] | None, spectra: bool = False
 ) -> dict[str, Any]:
     """A system under its title, and others by their names; ModelError for what is none, or of another shape."""
     found: dict[str, Any] = {system.title: system}
     place = f"{system.title}.{verb}"
-    expected = "systems or measured spectra" if spectra else "systems"
-    if not isinstance(beside, Mapping | None):
-        raise ModelError(
-            f"{place}: found beside={type(beside).__name__}, expected {expected} by their names, {{'measured': ...}}"
-        )
-    for label, other in (beside or {}).items():
-        if label in found:
-            raise ModelError(f"{place}: found the name {label!r} twice; give the other one a name of its own")
+    expected = (
+        f"{'systems or measured spectra' if spectra else 'systems'} by other names, {{'measured': ...}}"
+    )
+    for label, other in instance(place, "beside", beside or {}, Mapping, expected).items():
         measured = spectra and hasattr(other, "hertz")
-        if not measured and not (hasattr(other, "poles") and hasattr(other, "outputs")):
-            raise ModelError(f"{place}: found {label}={type(other).__name__}, expected {expected}")
+        known = measured or (hasattr(other, "poles") and hasattr(other, "outputs"))
+        if label in found or not known:
+            raise ModelError(f"expected {expected}", place=place, found=Given("beside", beside))
         shape = np.shape(other.response)[:2] if measured else (len(other.outputs), len(other.inputs))
         own = (len(system.outputs), len(system.inputs))
         if spectra and shape != own:
-            raise ModelError(
-                f"{place}: found {shape[0]} outputs and {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
-            )
+            words = f"found {shape[0]} outputs, {shape[1]} inputs of {label}, expected {own[0]} and {own[1]}"
+            raise ModelError(words, place=place, argument="beside")
         found[label] = other
     return found
 
@@ -127,7 +109,9 @@ def curves_of(systems: Mapping[str, Any], frequencies: Any) -> list["Curves"]:
     return found
 
 
-def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None) -> "Figure":
+def draw_bode(
+    system: "LinearSystem", curves: Sequence[Curves], file: str | os.PathLike[str] | None
+) -> "Figure":
     """Gain in the units of the quantities and phase in degrees over frequency in Hz, a column for each input."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
@@ -136,10 +120,8 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
         check_suffix(file)
     rows, columns = len(system.outputs), len(system.inputs)
     if not 0 < rows * columns <= MOST:
-        raise ModelError(
-            f"{system.title}: plot_bode found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name "
-            "fewer in inputs= and outputs="
-        )
+        words = f"found {rows} outputs and {columns} inputs, expected 1 to {MOST} pairs; name fewer in "
+        raise ModelError(words, Given("inputs"), " and ", Given("outputs"), place=f"{system.title}.plot_bode")
     figure, axes = plt.subplots(
         2 * rows,
         columns,
@@ -155,9 +137,7 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
             for one in curves:
                 _draw_curve(gain, phase, one, one.response[i, j])
             gain.set_xscale("log")
-            gain.set_yscale(
-                "log" if any(np.any(np.abs(one.response[i, j]) > 0) for one in curves) else "linear"
-            )
+            gain.set_yscale("log" if any(np.any(abs(one.response[i, j]) > 0) for one in curves) else "linear")
             gain.set_ylabel(f"gain [{_ratio(system.unit(output), system.unit(name))}]")
             gain.set_title(f"{output} over {name}", fontsize="medium")
             phase.set_ylabel("phase [deg]")
@@ -189,7 +169,7 @@ def _draw_curve(gain: "Axes", phase: "Axes", curve: Curves, values: np.ndarray) 
     phase.semilogx(curve.hertz, angles, linestyle=line, marker=marker, markersize=3)
 
 
-def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None) -> "Figure":
+def draw_poles(systems: Mapping[str, "LinearSystem"], file: str | os.PathLike[str] | None) -> "Figure":
     """Poles as crosses, zeros as circles; the edge of stability is the imaginary axis or the unit circle.
 
     Of several systems in the plane of z where they share a period, else in that of s, where those of z have no zeros:

@@ -1,7 +1,7 @@
 """The face of linear systems: what one answers, in a line each."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,8 @@ from gantrytau.answers.linear_systems.poles_and_zeros import (
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
 from gantrytau.answers.linear_systems.system_files import record, save_system
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, number
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 
 if TYPE_CHECKING:
@@ -80,14 +81,11 @@ class LinearSystem(Record):
         C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for what are no
         frequencies, and above half the sampling frequency of a discrete system, where it only repeats itself.
         """
-        hertz = np.atleast_1d(np.asarray(frequencies, dtype=float))
-        if hertz.ndim != 1 or not np.all(np.isfinite(hertz)) or np.any(hertz < 0):
-            raise ModelError(f"{self.title}: found frequencies {frequencies!r}, expected numbers in Hz, (N,)")
-        if self.period is not None and np.any(hertz > (0.5 + 1e-12) / self.period):
-            raise ModelError(
-                f"{self.title}: found a frequency of {hertz.max():g} Hz, expected none above {0.5 / self.period:g} Hz, half "
-                "of the sampling frequency"
-            )
+        hertz = np.atleast_1d(array(self.title, "frequencies", frequencies, (), (None,)))
+        half = np.inf if self.period is None else 0.5 / self.period
+        if np.any(hertz < 0) or np.any(hertz > half * (1 + 1e-12)):
+            words = f"expected 0 to {half:g} Hz{'' if self.period is None else ', half of the sampling frequency'}"
+            raise ModelError(words, place=self.title, found=Given("frequencies", frequencies))
         s = 2j * np.pi * hertz
         points = s if self.period is None else np.exp(s * self.period)
         return frequency_response(self.A, self.B, self.C, self.D, points)
@@ -98,13 +96,10 @@ class LinearSystem(Record):
         period: s. ModelError for a system that is discrete already, or a period that is none.
         """
         if self.period is not None:
-            raise ModelError(
-                f"{self.title}: found a discrete system with a period of {self.period:g} s, expected a continuous one; "
-                "take it as it is, or linearize with another period="
-            )
-        check_period(self.title, period)
-        A, B = held(self.A, self.B, float(period))
-        return _Plain(self, A, B, float(period))
+            words = f"found a discrete system with a period of {self.period:g} s, expected a continuous one; take it as it "
+            raise ModelError(words, "is, or linearize with another ", Given("period"), place=self.title)
+        period = number(self.title, "period", period, unit="s", above=0)
+        return _Plain(self, *held(self.A, self.B, period), period)
 
     def continuous(self) -> "LinearSystem":
         """The continuous system that this one is from sample to sample with inputs held: the inverse of `discrete`.
@@ -113,9 +108,7 @@ class LinearSystem(Record):
         for a pole at zero or on the negative real axis, which no continuous system of this order has.
         """
         if self.period is None:
-            raise ModelError(
-                f"{self.title}: found a continuous system, expected one with a period; take it as it is"
-            )
+            raise ModelError(f"{self.title}: found a continuous system, expected one with a period")
         poles = self.poles
         real = np.abs(np.imag(poles)) <= ROUNDING * np.abs(poles)
         strange = poles[real & (np.real(poles) <= ROUNDING)]
@@ -143,9 +136,7 @@ class LinearSystem(Record):
         x: the state at the first sample, (n,), else zero. Of a linearization all are differences from its point.
         """
         name = f"{self.title}.simulate"
-        start = np.zeros(len(self.A)) if x is None else np.asarray(x, dtype=float)
-        if start.shape != (len(self.A),):
-            raise ModelError(f"{name}: x has shape {start.shape}, expected ({len(self.A)},), the states")
+        start = np.zeros(len(self.A)) if x is None else array(name, "x", x, (len(self.A),))
         if self.period is not None:
             if isinstance(u, tuple):
                 raise ModelError(
@@ -154,14 +145,12 @@ class LinearSystem(Record):
                 )
             return stepped(self.A, self.B, self.C, self.D, checked_inputs(name, u, len(self.inputs)), start)
         if not (isinstance(u, tuple) and len(u) == 2):
-            raise ModelError(
-                f"{name}: found {type(u).__name__}, expected (times, values): the system is continuous"
-            )
-        times, values = np.asarray(u[0], dtype=float), checked_inputs(name, u[1], len(self.inputs))
-        if times.shape != (len(values),) or not np.all(np.diff(times) > 0):
-            raise ModelError(
-                f"{name}: found times of shape {times.shape} for {len(values)} samples, expected one each, rising"
-            )
+            words = f"found {type(u).__name__}, expected (times, values): the system is continuous"
+            raise ModelError(words, place=name)
+        values = checked_inputs(name, u[1], len(self.inputs))
+        times = array(name, "times", u[0], (len(values),))
+        if not np.all(np.diff(times) > 0):
+            raise ModelError(f"{name}: found times that do not rise, expected one later than the other")
         return driven(self.A, self.B, self.C, self.D, times, values, start)
 
     def plot_bode(
@@ -221,28 +210,3 @@ class _Plain(LinearSystem):
     def title(self) -> str:
         """What it was made of, and its period."""
         return f"{self._of}, {'continuous' if self.period is None else f'every {self.period:g} s'}"
-
-
-def check_period(place: str, period: Any) -> None:
-    """ModelError for what is no sampling period."""
-    number = isinstance(period, (int, float, np.number)) and not isinstance(period, bool)
-    if not number or not 0 < period < np.inf:
-        raise ModelError(
-            f"{place}: found period={period!r}, expected a finite number above zero, in s", argument="period"
-        )
-
-
-def check_matrices(place: str, A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> None:
-    """ModelError where matrices do not fit together, or are not finite."""
-    n, m, k = len(A), B.shape[1] if B.ndim == 2 else 0, len(C)
-    expected: Sequence[tuple[str, np.ndarray, tuple[int, ...], str]] = (
-        ("A", A, (n, n), "a row and a column for each state"),
-        ("B", B, (n, m), "a row for each state, a column for each input"),
-        ("C", C, (k, n), "a row for each output, a column for each state"),
-        ("D", D, (k, m), "a row for each output, a column for each input"),
-    )
-    for name, matrix, shape, words in expected:
-        if matrix.shape != shape:
-            raise ModelError(f"{place}: {name} has shape {matrix.shape}, expected {shape}: {words}")
-        if not np.all(np.isfinite(matrix)):
-            raise ModelError(f"{place}: {name} has elements that are not finite; repair them")

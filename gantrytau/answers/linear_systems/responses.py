@@ -3,6 +3,7 @@
 import numpy as np
 
 from gantrytau.answers.linear_systems.discretisation import ramped
+from gantrytau.border.checks import array
 from gantrytau.border.refusal import ModelError
 
 AT_ONCE = 4_000_000  # numbers in the matrices that are solved in one call
@@ -56,20 +57,8 @@ def driven(
 
 
 def checked_inputs(name: str, u: object, count: int) -> np.ndarray:
-    """Samples of `count` inputs as (N, count); ModelError for another shape or what is not finite."""
-    try:
-        found = np.asarray(u, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(
-            f"{name}: found {type(u).__name__}, expected samples of the inputs, (N, {count})"
-        ) from None
-    if found.ndim == 1 and count == 1:
-        found = found[:, None]
-    if found.ndim != 2 or found.shape[1] != count or not len(found):
-        raise ModelError(
-            f"{name}: samples of the inputs have shape {found.shape}, expected (N, {count}), a column for each input"
-        )
-    if not np.all(np.isfinite(found)):
-        row = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
-        raise ModelError(f"{name}: sample {row} of the inputs is not finite; remove or repair it")
-    return found
+    """Samples of `count` inputs as (N, count), N > 0; ModelError for another shape or what is not finite."""
+    found = array(name, "u", u, (None, count), *([(None,)] if count == 1 else []))
+    if not len(found):
+        raise ModelError(f"{name}: found no samples, expected at least one", argument="u")
+    return found.reshape(len(found), count)

@@ -6,8 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau.answers.linear_systems.linear_system import LinearSystem, check_matrices, check_period
-from gantrytau.border.refusal import ModelError
+from gantrytau.answers.linear_systems.linear_system import LinearSystem
+from gantrytau.border.checks import array, number
 from gantrytau.language.declarations import Input, Output, Real
 from gantrytau.language.events import sampled
 from gantrytau.language.model import Model
@@ -31,11 +31,8 @@ class StateSpace(LinearSystem, Model):
     def __init__(
         self, A: Any, B: Any, C: Any, D: Any = 0, *, period: float | None = None, **modifications: Any
     ):
+        self.period = None if period is None else number("StateSpace", "period", period, unit="s", above=0)
         self.A, self.B, self.C, self.D = _matrices(A, B, C, D)
-        check_matrices("StateSpace", self.A, self.B, self.C, self.D)
-        if period is not None:
-            check_period("StateSpace", period)
-        self.period = period
         self.states = _names("x", (len(self.A),))
         self.inputs, self.outputs = (
             _names(letter, _sized(count)) for letter, count in (("u", self.B.shape[1]), ("y", len(self.C)))
@@ -60,17 +57,20 @@ class StateSpace(LinearSystem, Model):
 
 
 def _matrices(A: Any, B: Any, C: Any, D: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """As matrices; a column for B and a row for C may be flat, and 0 stands for a D of zeros."""
-    try:
-        A, B, C, D = (np.array(M, dtype=float) for M in (A, B, C, D))
-    except (TypeError, ValueError):
-        raise ModelError("StateSpace: found matrices that are no numbers, expected A, B, C and D") from None
+    """As matrices; a column for B and a row for C may be flat, and 0 stands for a D of zeros.
+
+    ModelError where they do not fit together: n states, m inputs, k outputs.
+    """
+    A, B, C, D = (array("StateSpace", *pair) for pair in (("A", A), ("B", B), ("C", C), ("D", D)))
     n = A.shape[0] if A.ndim == 2 else 1
     A = A.reshape(1, 1) if A.size == 1 else A
     B = B.reshape(n, -1) if B.ndim < 2 and B.size % n == 0 else np.atleast_2d(B).T if B.ndim < 2 else B
     C = C.reshape(-1, n) if C.ndim < 2 and C.size % n == 0 else np.atleast_2d(C)
     if D.ndim < 2:
         D = np.full((len(C), B.shape[1]), float(D)) if D.size == 1 and not np.any(D) else np.atleast_2d(D)
+    k, m = len(C), B.shape[-1]
+    shapes = {"A": (A, (n, n)), "B": (B, (n, m)), "C": (C, (k, n)), "D": (D, (k, m))}
+    A, B, C, D = (array("StateSpace", name, matrix, shape) for name, (matrix, shape) in shapes.items())
     return A, B, C, D
 
 

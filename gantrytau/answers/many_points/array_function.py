@@ -38,13 +38,13 @@ class _Arrays:
     def __call__(self, q: np.ndarray) -> list[np.ndarray]:
         return self._answered(q)[0]
 
-    def slopes(self, q: np.ndarray) -> np.ndarray:
-        """Slopes of all results, below each other, by all arguments, (N, m, k)."""
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Jacobian of all results, below each other, by all arguments, (N, m, k)."""
         _, tears, doubtful = self._answered(q)
-        found = self.first.slopes(q, tears)
+        found = self.first.jacobian(q, tears)
         if doubtful.size:
             there = q[:, doubtful]
-            found[doubtful] = self.second.slopes(there, self.second.tears(there))
+            found[doubtful] = self.second.jacobian(there, self.second.tears(there))
         return found
 
     def _answered(self, q: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
@@ -63,9 +63,9 @@ class _Arrays:
         """Results at arguments to which the straight way from the start does not lead, by the ways that others took."""
         return self.second.targets(q, self.grown(q))[0]
 
-    def slopes_around(self, q: np.ndarray) -> np.ndarray:
-        """Their slopes."""
-        return self.second.slopes(q, self.grown(q))
+    def jacobian_around(self, q: np.ndarray) -> np.ndarray:
+        """Their Jacobian."""
+        return self.second.jacobian(q, self.grown(q))
 
     @cached_property
     def grown(self) -> GrownBranch:
@@ -106,9 +106,9 @@ class ArrayFunction:
         """Results in the order of the names."""
         return self._everywhere(self._checked(arguments), self._some)
 
-    def slopes(self, *arguments: np.ndarray) -> np.ndarray:
-        """Slopes of all results, below each other, by all arguments, (N, m, k)."""
-        return self._everywhere(self._checked(arguments), self._slopes_of_some)[0]
+    def jacobian(self, *arguments: np.ndarray) -> np.ndarray:
+        """Jacobian of all results, below each other, by all arguments, (N, m, k)."""
+        return self._everywhere(self._checked(arguments), self._jacobian_of_some)[0]
 
     def around(self, *arguments: np.ndarray) -> list[np.ndarray]:
         """Results, where the straight way from the start ends by ways around: as far as the branch goes."""
@@ -116,11 +116,11 @@ class ArrayFunction:
         found = self._everywhere(q, self._some)
         return self._completed(q, found, lambda arrays, rows: [x.T for x in arrays.around(rows)])
 
-    def slopes_around(self, *arguments: np.ndarray) -> np.ndarray:
-        """Slopes of these, (N, m, k)."""
+    def jacobian_around(self, *arguments: np.ndarray) -> np.ndarray:
+        """Jacobian of these, (N, m, k)."""
         q = self._checked(arguments)
-        found = self._everywhere(q, self._slopes_of_some)
-        return self._completed(q, found, lambda arrays, rows: [arrays.slopes_around(rows)])[0]
+        found = self._everywhere(q, self._jacobian_of_some)
+        return self._completed(q, found, lambda arrays, rows: [arrays.jacobian_around(rows)])[0]
 
     def solutions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Results (m, n) of all branches at arguments (k,) and signs that tell them apart, (s, m)."""
@@ -184,9 +184,9 @@ class ArrayFunction:
         found = self._by_arrays(q, lambda arrays: [x.T for x in arrays(q.T)])
         return self._points(q) if found is None else found
 
-    def _slopes_of_some(self, q: np.ndarray) -> list[np.ndarray]:
-        found = self._by_arrays(q, lambda arrays: [arrays.slopes(q.T)])
-        return [self._points.slopes(q)] if found is None else found
+    def _jacobian_of_some(self, q: np.ndarray) -> list[np.ndarray]:
+        found = self._by_arrays(q, lambda arrays: [arrays.jacobian(q.T)])
+        return [self._points.jacobian(q)] if found is None else found
 
     def _by_arrays(
         self, q: np.ndarray, answer: Callable[[_Arrays], list[np.ndarray]]

@@ -87,9 +87,8 @@ class ArrayProgram:
 
     def __init__(self, function: ca.Function):
         self._sizes = [function.numel_out(i) for i in range(function.n_out())]
-        steps: list[
-            tuple[Callable[..., Any] | None, list[int]]
-        ] = []  # step k gives the value k; None: it is there
+        # step k gives the value k; None: it is there
+        steps: list[tuple[Callable[..., Any] | None, list[int]]] = []
         inputs: dict[int, tuple[int, int]] = {}
         constants: dict[int, float] = {}
 

@@ -20,9 +20,8 @@ from gantrytau.language.term_sizes import term_sizes
 
 MOST = one.TRIALS[0] * one.TRIALS[1]
 CORRECTIONS = 8
-SETTLED = (
-    1e-8  # of the unknowns in their sizes: a correction after which Newton's method has reached rounding
-)
+# of the unknowns in their sizes: a correction after which Newton's method has reached rounding
+SETTLED = 1e-8
 STARTS, STEPS = 200, 40  # of Newton's method for all solutions, and as many steps
 SAME = 1e-6  # of one, by which unknowns of one solution may differ
 ONWARD = 0.1  # of what is left of the way, the first trial after pivots are chosen anew

@@ -44,9 +44,8 @@ class ReducedBranch:
         doubtful = np.flatnonzero(np.isfinite(y[0]) & ~sure)
         if doubtful.size:
             other = self.whole(end[:, doubtful])
-            gaps = np.nan_to_num(
-                other - self.kept[:, None]
-            )  # beside what is kept, other branches have split off
+            # beside what is kept, other branches have split off
+            gaps = np.nan_to_num(other - self.kept[:, None])
             y[:, doubtful] = np.where(np.abs(gaps).max(axis=0) <= SETTLED, other, np.nan)
         return y
 
@@ -104,8 +103,8 @@ def reduced(whole: FollowedBranch, y: np.ndarray) -> FollowedBranch | ReducedBra
     inserted = ca.vertcat(*(unknowns[j] if np.isnan(kept[j]) else ca.SX(kept[j]) for j in range(count)))
     f = ca.densify(whole.residual(inserted, q))
     z = ca.vertcat(*(unknowns[int(j)] for j in free)) if free.size else ca.SX(0, 1)
-    slopes = ca.Function("slopes", [unknowns, q], [ca.densify(ca.jacobian(f, z))])
-    matrix = np.array(slopes(ca.DM(whole.start), ca.DM(whole.begin)))
+    jacobian = ca.Function("jacobian", [unknowns, q], [ca.densify(ca.jacobian(f, z))])
+    matrix = np.array(jacobian(ca.DM(whole.start), ca.DM(whole.begin)))
     parts, places = [], []
     for rows, columns in _parts(matrix):
         own = ca.vertcat(*(z[j] for j in columns))

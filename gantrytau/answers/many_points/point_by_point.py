@@ -28,9 +28,9 @@ class PointByPoint:
         """Results one by one."""
         return _in_blocks(self._function, q)
 
-    def slopes(self, q: np.ndarray) -> np.ndarray:
-        """Slopes of all results, below each other, by all arguments, (N, m, k)."""
-        (found,) = _in_blocks(self._slopes, q)
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Jacobian of all results, below each other, by all arguments, (N, m, k)."""
+        (found,) = _in_blocks(self._jacobian, q)
         return found.reshape(len(q), self._count, sum(y.numel() for y in self._results)).transpose(0, 2, 1)
 
     @cached_property
@@ -38,10 +38,10 @@ class PointByPoint:
         return ca.Function("points", [self._argument], self._results)
 
     @cached_property
-    def _slopes(self) -> ca.Function:
+    def _jacobian(self) -> ca.Function:
         """The Jacobian, column after column."""
         whole = ca.vertcat(*map(ca.vec, self._results))
-        return ca.Function("slopes", [self._argument], [ca.densify(ca.jacobian(whole, self._argument))])
+        return ca.Function("jacobian", [self._argument], [ca.densify(ca.jacobian(whole, self._argument))])
 
 
 def _in_blocks(function: ca.Function, q: np.ndarray) -> list[np.ndarray]:

@@ -15,10 +15,8 @@ from gantrytau.answers.many_points.kept_unknowns import ReducedBranch, reduced
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.language.piecewise import switched
 
-AROUND = (
-    0.02,
-    0.1,
-)  # of one, or of an argument where it is larger: how far from the start unknowns are looked at
+# of one, or of an argument where it is larger: how far from the start unknowns are looked at
+AROUND = (0.02, 0.1)
 LOOKED_AT = 16  # points at each of these distances
 
 
@@ -89,7 +87,7 @@ class ThroughBlocks:
         whole = [ca.densify(ca.vec(t)) for t in targets]
         holds = [reduce(ca.logic_and, trusted)] if trusted else [ca.SX(1)]
         self._rest = ArrayProgram(ca.Function("rest", everything, [*whole, *holds], {"cse": True}))
-        self._slopes = lambda: _slopes(everything, residuals, ca.vertcat(*whole))
+        self._jacobian = lambda: _jacobian_of(everything, residuals, ca.vertcat(*whole))
 
     def tears(self, q: np.ndarray) -> np.ndarray:
         """Unknowns without closed form (n, N) of arguments (k, N)."""
@@ -128,9 +126,9 @@ class ThroughBlocks:
         return found, holds[0] != 0
 
     @cached_property
-    def slopes(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        """(arguments, tears) -> the slopes of all targets, (N, m, k)."""
-        return self._slopes()
+    def jacobian(self) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """(arguments, tears) -> the Jacobian of all targets, (N, m, k)."""
+        return self._jacobian()
 
 
 def _around(start: np.ndarray) -> np.ndarray:
@@ -142,12 +140,12 @@ def _around(start: np.ndarray) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _slopes(everything: Sequence[ca.SX], residuals: ca.SX, targets: ca.SX):
+def _jacobian_of(everything: Sequence[ca.SX], residuals: ca.SX, targets: ca.SX):
     """(arguments, tears) -> dtargets/darguments, by the theorem of implicit functions."""
     q, y = everything
     n, m, k = y.numel(), targets.numel(), q.numel()
     parts = [ca.densify(ca.jacobian(f, x)) for f in (targets, residuals) for x in (q, y)]
-    program = ArrayProgram(ca.Function("slopes", [q, y], parts, {"cse": True}))
+    program = ArrayProgram(ca.Function("jacobian", [q, y], parts, {"cse": True}))
 
     def of(q: np.ndarray, y: np.ndarray) -> np.ndarray:
         sizes = ((m, k), (m, n), (n, k), (n, n))

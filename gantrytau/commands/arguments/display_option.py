@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from gantrytau import FlatModel, ModelError, Result, si
 from gantrytau.border import listed
-from gantrytau.commands.printing.reporting import CommandError
-
-if TYPE_CHECKING:
-    from gantrytau import FlatModel, Result
+from gantrytau.commands.printing.reporting import CommandError, refusing
 
 Displayed = Annotated[
     list[str] | None,
@@ -47,20 +45,14 @@ def displayed(texts: list[str] | None) -> Any:
 
 
 def _check(unit: str, part: str = "") -> None:
-    from gantrytau import ModelError, si
-
     if unit in WORDS and not part:
         return
-    try:
+    with refusing(f"--display {part or unit}: "):
         si(1.0, unit)
-    except ModelError as error:
-        raise CommandError(f"--display {part or unit}: {error}") from error
 
 
-def check_display(display: Any, flat: "FlatModel", drawn: Sequence[str] = ()) -> None:
+def check_display(display: Any, flat: FlatModel, drawn: Sequence[str] = ()) -> None:
     """CommandError, before anything is computed, for units that no variable of a model, or none that is drawn, has."""
-    from gantrytau import ModelError, Result
-
     if display is None or display in WORDS:
         return
     units = {v.name: v.unit or "" for v in (*flat.variables, *flat.parameters, *flat.propagated)}
@@ -73,7 +65,7 @@ def check_display(display: Any, flat: "FlatModel", drawn: Sequence[str] = ()) ->
     try:
         Result([0.0], trial, units=units, title=flat.name).shown(*names, "time", display=display)
     except ModelError as error:
-        raise CommandError(str(error).replace(": shown: display", ": --display", 1)) from error
+        raise CommandError(f"{flat.name}: --{error.words(str)}") from error
 
 
 def of_file(display: Any, file: Path | None) -> dict[str, Any]:
@@ -82,10 +74,8 @@ def of_file(display: Any, file: Path | None) -> dict[str, Any]:
     return {"display": display} if csv and display is not None else {}
 
 
-def of_table(result: "Result", names: Sequence[str], display: Any) -> Mapping[str, Any]:
+def of_table(result: Result, names: Sequence[str], display: Any) -> Mapping[str, Any]:
     """Values and unit of each variable in a table of a command."""
-    from gantrytau import ModelError
-
     try:
         return result.shown(*names, display=display)
     except ModelError:  # a unit for what is drawn beside

@@ -1,5 +1,6 @@
 """From what stands on the command line to a model: found in the library or in a file, built, modified."""
 
+import importlib
 import inspect
 import typing
 import warnings
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau import Connector, Model, ModelError, check_member, parameters_of, read_parameters, with_setting
-from gantrytau.border import NamedObject, import_by_name, load, similar, source_of
+from gantrytau.border import NamedObject, import_by_name, load, prototype, similar, source_of
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError, note, refusing
 
@@ -18,9 +19,9 @@ FIRST_PROTOTYPE = "L1"
 
 @dataclass(frozen=True)
 class Kind:
-    """What a command works on: classes that inherit from `base`, called `word`, as for example `example`."""
+    """What a command works on: classes that inherit from the class `path`, called `word`, as for example `example`."""
 
-    base: type[Model]
+    path: str
     word: str
     example: str
 
@@ -29,11 +30,17 @@ class Kind:
 
     def __str__(self) -> str:
         """What is expected, in words."""
-        package = self.base.__module__.partition(".")[0]
-        return f"a {self.word}: a class that inherits from {package}.{self.base.__name__}"
+        return f"a {self.word}: a class that inherits from {self.path}"
+
+    @property
+    def base(self) -> Any:
+        """The class."""
+        package, _, name = self.path.rpartition(".")
+        return getattr(importlib.import_module(package), name)
 
 
-MODEL = Kind(Model, "model", "robot.py:Robot")
+MODEL = Kind("gantrytau.Model", "model", "robot.py:Robot")
+PROBLEM = Kind("gantrytau_optimica.Optimization", "problem", "move.py:Fastest")
 
 
 @dataclass(frozen=True)
@@ -48,13 +55,15 @@ class Chosen:
         """Class of the model."""
         return type(self.model).__name__
 
+    def record(self, key: str) -> dict[str, str | None]:
+        """Name and prototype, for programs."""
+        return {key: self.name, "prototype": self.prototype}
 
-def build(
-    text: str, prototype: str | None = None, settings: Sequence[str] = (), kind: Kind = MODEL
-) -> Chosen:
+
+def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kind: Kind = MODEL) -> Chosen:
     """The model that MODEL, `--prototype` and `--set` describe; CommandError with a remedy if there is none."""
     choice = NamedObject.read(text)
-    wanted = _wanted(choice, text, prototype)
+    wanted = _wanted(choice, text, robot)
     if choice.file and choice.file.suffix.lower() == ".urdf":
         found = _in_urdf(choice.file, kind)
     else:
@@ -76,34 +85,34 @@ def build(
     return Chosen(model, chosen.prototype)
 
 
-def _settings(settings: Sequence[str], prototype: str | None) -> Iterator[tuple[str, Any]]:
+def _settings(settings: Sequence[str], made_from: str | None) -> Iterator[tuple[str, Any]]:
     """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`.
 
-    prototype: of the model; a file that says it belongs to another one is taken, with a warning.
+    made_from: the prototype of the model; a file that says it belongs to another one is taken, with a warning.
     """
     for setting in settings:
         if setting.endswith(".toml") and "=" not in setting:
             with refusing("--set "):
                 values = read_parameters(Path(setting))
             own = parameters_of(Path(setting))
-            if own and prototype and own != prototype:
-                note(f"--set {setting}: these are values of {own}, found with {prototype}; expected ({own})")
+            if own and made_from and own != made_from:
+                note(f"--set {setting}: these are values of {own}, found with {made_from}; expected ({own})")
             yield from values.items()
         else:
             name, value = split("--set", setting)
             yield name, number("--set", name, value)
 
 
-def _wanted(choice: NamedObject, text: str, prototype: str | None) -> str | None:
+def _wanted(choice: NamedObject, text: str, robot: str | None) -> str | None:
     """The prototype that is named, in parentheses or by `--prototype`."""
     named = choice.prototypes
     if len(named) > 1:
         raise CommandError(f"{text}: found {', '.join(named)}, expected one prototype and NAME=VALUE")
-    if prototype and named and prototype != named[0]:
+    if robot and named and robot != named[0]:
         raise CommandError(
-            f"found the prototype {named[0]} in {text} and --prototype {prototype}; name one of them"
+            f"found the prototype {named[0]} in {text} and --prototype {robot}; name one of them"
         )
-    return prototype or (named[0] if named else None)
+    return robot or (named[0] if named else None)
 
 
 def _keywords(found: type[Model], choice: NamedObject) -> dict[str, Any]:
@@ -288,17 +297,15 @@ def _prototype(found: type[Model], name: str) -> Any:
     """The prototype of that name for a class, with what it warns of."""
     from gantrytau_models import prototypes
 
-    names, fitting = prototype_names(), fitting_prototypes(found)
-    if name not in names:
-        raise CommandError(f"--prototype {name}: there is no such robot{similar(name, names)}")
+    with warnings.catch_warnings(record=True) as caught, refusing(f"--prototype {name}: "):
+        warnings.simplefilter("always")
+        record = prototype(name, prototypes)
+    fitting = fitting_prototypes(found)
     if name not in fitting:
         raise CommandError(
             f"--prototype {name}: {found.__name__} cannot take the measures of this kind of robot, "
             f"expected one of {', '.join(fitting)}"
         )
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        record = getattr(prototypes, name)
     for warning in caught:
         note(f"Note: {warning.message}")
     return record

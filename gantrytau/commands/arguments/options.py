@@ -17,6 +17,16 @@ ModelName = Annotated[
         show_default=False,
     ),
 ]
+RobotName = Annotated[
+    str,
+    typer.Option(
+        "--robot",
+        metavar="MODEL",
+        help="The robot with its nominal values, named as for the other commands: 'GantryTau(L1)', robot.py:Robot.",
+        show_default=False,
+        autocompletion=shell_offers.models,
+    ),
+]
 PrototypeName = Annotated[
     str | None,
     typer.Option(
@@ -83,8 +93,5 @@ Inputs = Annotated[
         show_default=False,
     ),
 ]
-Seed = Annotated[
-    int | None,
-    typer.Option(help="Of signals that have none: the same numbers for the same seed.", show_default=False),
-]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs, also for errors.")]

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import did_you_mean, read_toml
-from gantrytau.border import NamedObject, load, similar
+from gantrytau import read_toml
+from gantrytau.border import NamedObject, Value, named, read_table
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.values import signal, with_unit
 from gantrytau.commands.printing.reporting import CommandError, refusing
@@ -28,7 +28,11 @@ POLICY = (
     "where",
     "folder",
 )
-TABLES = ("over", "set", "starts", "inputs")
+KEYS = {
+    **dict.fromkeys(("model", "function"), Value("text")),
+    **dict.fromkeys(POLICY, Value("any")),
+    **dict.fromkeys(("over", "set", "starts", "inputs"), Value("table")),
+}
 EXAMPLE = """\
 # gantrytau study swings.toml --plot x --to swings.png
 model = "Pendulum"    # as for the other commands: 'GantryTau(L1)', robot.py:Robot; or function = "moves.py:fastest"
@@ -59,27 +63,15 @@ class StudyFile:
 def read_study(file: Path) -> StudyFile:
     """The study that a file describes; CommandError for what is missing, unknown or of the wrong kind."""
     with refusing():
-        table = read_toml(file)
-    for key in table:
-        known = ("model", "function", *POLICY, *TABLES)
-        if key not in known:
-            raise CommandError(f"{file}: there is no key '{key}'{did_you_mean(key, known)}")
-    for key in TABLES:
-        if not isinstance(table.get(key, {}), dict):
-            raise CommandError(
-                f"{file}: found {key} = {table[key]!r}, expected a table: a line [{key}], then name = value"
-            )
+        table = read_table(f"{file}: ", read_toml(file), KEYS)
     if ("model" in table) == ("function" in table):
         found = "both" if "model" in table else "neither"
         raise CommandError(
             f'{file}: found {found} of model and function, expected one, as model = "Pendulum"'
         )
-    key = "model" if "model" in table else "function"
-    if not isinstance(table[key], str):
-        raise CommandError(f"{file}: found {key} = {table[key]!r}, expected a name in quotes")
     keywords = {k: table[k] for k in POLICY if k in table}
     keywords["over"] = {name: _values(file, name, v) for name, v in table.get("over", {}).items()}
-    if key == "function":
+    if "function" in table:
         return StudyFile(_function(file, table["function"]), table["function"], keywords)
     for place, keyword in (("set", "parameters"), ("starts", "starts")):
         if table.get(place):
@@ -125,10 +117,5 @@ def _function(file: Path, text: str) -> Any:
         raise CommandError(
             f"{file}: found function = '{text}', expected its file and name, as moves.py:fastest"
         )
-    module = load(choice.file)
-    functions = {n: v for n, v in vars(module).items() if callable(v) and not n.startswith("_")}
-    if choice.name not in functions:
-        raise CommandError(
-            f"{file}: {choice.file.name} has no function '{choice.name}'{similar(choice.name, functions)}"
-        )
-    return functions[choice.name]
+    with refusing(f"{file}: "):
+        return named(text, Path(), "gantrytau_models")

@@ -24,6 +24,13 @@ def split(option: str, text: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
+def pairs(option: str, texts: Iterable[str] | None) -> dict[str, Any]:
+    """Names and values of an option that may stand several times."""
+    return {
+        name: number(option, name, value) for name, value in (split(option, text) for text in texts or ())
+    }
+
+
 def number(option: str, name: str, text: str) -> Any:
     """A number, a truth value, a vector such as `[1, 2, 3]`, or a text with a unit; CommandError for all else."""
     try:
@@ -45,10 +52,8 @@ def number(option: str, name: str, text: str) -> Any:
 
 def with_unit(place: str, text: str) -> str:
     """A text such as "700 mm" or "[1, 2, 3] mm", which the model reads; CommandError for what is none."""
-    try:
+    with refusing(f"{place}: "):
         si(text)
-    except ModelError as error:
-        raise CommandError(f"{place}: {str(error).removeprefix('si: ')}") from error
     return text
 
 
@@ -58,25 +63,27 @@ def _numeric(value: Any) -> bool:
     return isinstance(value, (bool, int, float))
 
 
-def signal(text: str) -> tuple[str, Any]:
-    """The name and the value of `--input`: a number, samples from a column of a CSV file, or a signal.
+def signal(text: str, place: str = "--input") -> tuple[str, Any]:
+    """The name and the value of an input: a number, samples from a column of a CSV file, or a signal.
 
     text: `name=value`, `name=file.csv:column`, or `name=file.csv` where the column has the name of the input, behind
     either `:constant` for values that are held; `name=prbs(7, 0.1)` for a signal, its arguments numbers, texts and lists.
     """
-    name, value = split("--input", text)
+    name, value = split(place, text)
     path, dot, rest = value.rpartition(".csv")
     if dot and (not rest or rest.startswith(":")):
         column, colon, kind = rest.removeprefix(":").rpartition(":")
         if kind not in KINDS:
             column, kind = f"{column}{colon}{kind}", "linear"
-        return name, _kept(text, lambda: samples(Path(path + dot), column or name, kind))
+        with refusing(f"{place} {text}: "):
+            return name, samples(Path(path + dot), column or name, kind)
     if "(" in value and value.endswith(")") and value[0].isalpha():
-        return name, _kept(text, lambda: _called(text, value))
-    return name, number("--input", name, value)
+        with refusing(f"{place} {text}: "):
+            return name, _called(f"{place} {text}", value)
+    return name, number(place, name, value)
 
 
-def _called(text: str, value: str) -> InputSignal:
+def _called(place: str, value: str) -> InputSignal:
     """The signal that a call such as `prbs(7, hold=0.1)` makes; CommandError for another one."""
     try:
         call = ast.parse(value, mode="eval").body
@@ -86,16 +93,14 @@ def _called(text: str, value: str) -> InputSignal:
         keywords = {str(one.arg): ast.literal_eval(one.value) for one in call.keywords}
     except (SyntaxError, ValueError, AssertionError):
         raise CommandError(
-            f"--input {text}: expected a signal with numbers in it, as 'u=white_noise(0.1, 0.001, seed=1)'"
+            f"{place}: expected a signal with numbers in it, as 'u=white_noise(0.1, 0.001, seed=1)'"
         ) from None
     if call.func.id not in SIGNALS:
-        raise CommandError(
-            f"--input {text}: there is no signal {call.func.id}{did_you_mean(call.func.id, SIGNALS)}"
-        )
+        raise CommandError(f"{place}: there is no signal {call.func.id}{did_you_mean(call.func.id, SIGNALS)}")
     try:
         return getattr(gantrytau, call.func.id)(*arguments, **keywords)
     except TypeError as error:  # too few, too many or unknown ones
-        raise CommandError(f"--input {text}: expected {_usage(call.func.id)}") from error
+        raise CommandError(f"{place}: expected {_usage(call.func.id)}") from error
 
 
 def _usage(name: str) -> str:
@@ -111,13 +116,6 @@ def check_names(option: str, names: Iterable[str], expand: Callable[[str], Any])
     for name in names:
         with refusing(f"{option} {name}: "):
             expand(name)
-
-
-def _kept(text: str, make: Callable[[], Any]) -> Any:
-    try:
-        return make()
-    except ModelError as error:
-        raise CommandError(f"--input {text}: {error}") from error
 
 
 def samples(file: Path, column: str, kind: Any = "linear") -> Samples:

@@ -2,20 +2,23 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
 from gantrytau.border import listed, source_of
 from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
-from gantrytau.commands.arguments.shell_offers import words
+from gantrytau.commands.arguments.shell_offers import models
 from gantrytau.commands.calibrate import calibration_files
-from gantrytau.commands.calibrate.calibration_options import SPELLING, policy, rail_files
+from gantrytau.commands.calibrate.calibration_options import constraint_values, prior_values
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
 from gantrytau.commands.calibrate.outcome import NominalRobot, finish
 from gantrytau.commands.calibrate.plan_command import EXAMPLES, model_of_cell, plan
 from gantrytau.commands.printing.reporting import CommandError, refusing, reporting
+from gantrytau_optimica import calibrate as calibrated
+from gantrytau_optimica import cell_example, is_planned, load_planned_cell
 
 Source = Annotated[
     Path | None,
@@ -33,6 +36,7 @@ RobotName = Annotated[
         metavar="MODEL",
         help="The robot with its nominal values, named as for the other commands: 'GantryTau(L1)', robot.py:Robot.",
         show_default=False,
+        autocompletion=models,
     ),
 ]
 Rails = Annotated[
@@ -41,15 +45,6 @@ Rails = Annotated[
         metavar="FILES",
         help="Measured guideways for models 2, 4 and 5: a CSV file q,x,y,z for each, separated by commas.",
         show_default=False,
-    ),
-]
-ErrorModel = Annotated[
-    str | None,
-    typer.Option(
-        metavar="parallel|1..5",
-        autocompletion=words("parallel", "1", "2", "3", "4", "5"),
-        help="Error model; 1 to 5 are those of thesis Table 5.2.",
-        show_default="straight guideways, each with its direction",
     ),
 ]
 Prior = Annotated[
@@ -91,68 +86,58 @@ Output = Annotated[
 ]
 
 
+Robust = Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")]
+Holdout = Annotated[
+    Literal["second", "none"] | None,
+    typer.Option(
+        help="Which poses validate: every second, or those of the fit.",
+        show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
+    ),
+]
+Frame = Annotated[
+    Literal["fitted", "base"] | None,
+    typer.Option(
+        help="base: poses were measured in the base of the robot, where it is commanded; fitted: in any frame.",
+        show_default="as the plan says, else fitted",
+    ),
+]
+Example = Annotated[
+    bool,
+    typer.Option(
+        "--example",
+        help="Print the file of a cell, to begin with: --example l1, --example six (links), --example f1 (turntables), "
+        "or of the --robot.",
+    ),
+]
+
+
+@serves(
+    calibrated,
+    model=typer.Option(
+        help="Error model; 1 to 5 are those of thesis Table 5.2.",
+        show_default="straight guideways, each with its direction",
+    ),
+    method="How to solve.",
+    start="Where to start; linear needs no nominal values.",
+    orientation="How quaternions of turntables are free.",
+)
 def calibrate(
     file: Source = None,
     robot: RobotName = None,
     rails: Rails = None,
-    model: ErrorModel = None,
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="gauss-newton|ipopt", autocompletion=words("gauss-newton", "ipopt"), help="How to solve."
-        ),
-    ] = "gauss-newton",
-    start: Annotated[
-        str,
-        typer.Option(
-            metavar="nominal|linear",
-            autocompletion=words("nominal", "linear"),
-            help="Where to start; linear needs no nominal values.",
-        ),
-    ] = "nominal",
-    orientation: Annotated[
-        str,
-        typer.Option(
-            metavar="local|unit|free",
-            autocompletion=words("local", "unit", "free"),
-            help="How quaternions of turntables are free.",
-        ),
-    ] = "local",
     prior: Prior = None,
     parameters: Names = None,
     joints: Joints = None,
-    constraint: Constraints = None,
-    robust: Annotated[bool, typer.Option("--robust", help="Leave gross errors without weight.")] = False,
-    holdout: Annotated[
-        str | None,
-        typer.Option(
-            metavar="second|none",
-            autocompletion=words("second", "none"),
-            help="Which poses validate: every second, or those of the fit.",
-            show_default="second; of a plan, and of fewer than 60 poses, each fifth in turn",
-        ),
-    ] = None,
-    frame: Annotated[
-        str | None,
-        typer.Option(
-            metavar="fitted|base",
-            autocompletion=words("fitted", "base"),
-            help="base: poses were measured in the base of the robot, where it is commanded; fitted: in any frame.",
-            show_default="as the plan says, else fitted",
-        ),
-    ] = None,
+    constraints: Constraints = None,
+    loss: Robust = False,
+    holdout: Holdout = None,
+    frame: Frame = None,
     output: Output = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
-    example: Annotated[
-        bool,
-        typer.Option(
-            "--example",
-            help="Print the file of a cell, to begin with: --example l1, --example six (links), --example f1 (turntables), "
-            "or of the --robot.",
-        ),
-    ] = False,
+    example: Example = False,
     json: Json = False,
+    **policy: Any,
 ) -> None:
     """Calibrate a robot: plan what to measure (cell.toml), then find its parameters (measurements.csv).
 
@@ -162,10 +147,8 @@ def calibrate(
     measurements.csv gives the parameters, how sure they are, and the error that is left: a report (HTML and JSON), and
     calibrated.toml, which all commands take: --set calibrated.toml. The plan in its folder, or --robot, says of which robot.
     """
-    with reporting(json, source_of(robot) if robot else None, SPELLING):
+    with reporting(json, source_of(robot) if robot else None, {"kind": "--example"}):
         if example:
-            from gantrytau_optimica import cell_example
-
             typer.echo(cell_example(None if file is None else str(file), robot), nl=False)
             return
         if file is None:
@@ -174,16 +157,22 @@ def calibrate(
                 "gantrytau calibrate --example > cell.toml"
             )
         if file.suffix.lower() == ".toml":
-            others: dict[str, object] = dict(robot=robot, rails=rails, model=model, prior=prior, frame=frame)
-            others |= dict(parameters=parameters, joints=joints)
-            _refuse_others(file, others | dict(constraint=constraint, set=set_, prototype=prototype))
+            others: dict[str, object] = dict(robot=robot, rails=rails, model=policy["model"], prior=prior)
+            others |= dict(frame=frame, parameters=parameters, joints=joints, constraint=constraints)
+            _refuse_others(file, others | dict(set=set_, prototype=prototype))
             plan(file, output, json)
             return
         if not file.is_file():
             raise CommandError(f"{file}: there is no such file{_kinds(file)}")
-        words = dict(method=method, start=start, orientation=orientation, frame=frame)
-        how = policy(words, model, holdout or "second", prior, constraint or (), robust)
-        how |= dict(parameters=listed(parameters) or None, joints=listed(joints) or None)
+        policy |= dict(
+            frame=frame,
+            holdout=None if holdout == "none" else "second",
+            prior=prior_values(prior),
+            constraints=constraint_values(constraints or ()),
+            loss="robust" if loss else "linear",
+            parameters=listed(parameters) or None,
+            joints=listed(joints) or None,
+        )
         folder = output or calibration_files.folder_beside(file)
         calibration_files.rehearse(folder)
         nominal = _robot(file, robot, prototype, set_ or ())
@@ -191,8 +180,8 @@ def calibrate(
             raise CommandError(
                 f"{file}: the plan beside it is of a robot on rods; leave --parameters out, or give --robot"
             )
-        measured = MeasurementFile.read(file, rail_files(rails))
-        finish(nominal, measured, how, folder, validate=holdout is None, json=json)
+        measured = MeasurementFile.read(file, [Path(name) for name in listed([rails] if rails else None)])
+        finish(nominal, measured, policy, folder, validate=holdout is None, json=json)
 
 
 def _kinds(file: Path) -> str:
@@ -203,8 +192,6 @@ def _kinds(file: Path) -> str:
 
 def _robot(file: Path, robot: str | None, prototype: str | None, settings: Sequence[str]) -> NominalRobot:
     """The robot that is named, or that of the plan beside the measurements."""
-    from gantrytau_optimica import is_planned, load_planned_cell
-
     if robot is not None:
         chosen = build(robot, prototype, settings)
         name = f"{chosen.name}({chosen.prototype})" if chosen.prototype else robot

@@ -5,13 +5,10 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gantrytau import parameter_text
 from gantrytau.commands.printing.reporting import CommandError
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import About, Calibration
+from gantrytau_optimica import About, Calibration, calibrated_geometry, frame_words, write_report
 
 PARAMETERS = "calibrated.toml"
 REPORT = "report.html"
@@ -51,12 +48,10 @@ def whole(folder: Path) -> Iterator[Path]:
         shutil.rmtree(partial, ignore_errors=True)
 
 
-def write(found: "Calibration", folder: Path, robot: str, source: Path, about: "About") -> list[str]:
+def write(found: Calibration, folder: Path, robot: str, source: Path, about: About) -> list[str]:
     """Report and parameters; the files written. robot: as the command line names it; source: the measurements; about: what
     the report says besides.
     """
-    from gantrytau_optimica import calibrated_geometry, write_report
-
     with whole(folder) as partial:
         write_report(found, partial / REPORT, about)
         robot_values = calibrated_geometry(found)
@@ -69,9 +64,7 @@ def write(found: "Calibration", folder: Path, robot: str, source: Path, about: "
     return [str(folder / name) for name in names]
 
 
-def _heading(found: "Calibration", robot: str, source: Path, file: Path, verdict: str) -> str:
-    from gantrytau_optimica import frame_words
-
+def _heading(found: Calibration, robot: str, source: Path, file: Path, verdict: str) -> str:
     said = verdict or f"{found.error * 1e6:.4g} um in the mean of {len(found.held_out)} poses."
     return (
         f"Calibrated with {source.name}: lengths and offsets in m.\n"
@@ -83,7 +76,7 @@ def _heading(found: "Calibration", robot: str, source: Path, file: Path, verdict
     )
 
 
-def _frame_table(found: "Calibration") -> str:
+def _frame_table(found: Calibration) -> str:
     """R and t as a table of TOML, which stays a comment, as no robot has such parameters; nothing where there are none."""
     if "frame.R" not in found.parameters:
         return ""

@@ -1,56 +1,14 @@
-"""How `gantrytau calibrate measurements.csv` is to calibrate: its options as arguments of `calibrate`."""
+"""What options of `gantrytau calibrate measurements.csv` say of numbers: how well they are known, what they keep."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 from gantrytau.border import listed
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau.commands.printing.spelling import Spelling
-
-SPELLING = Spelling(
-    ("calibrate", "Measurements"),
-    {name: f"--{name}" for name in ("start", "method", "orientation", "holdout", "model", "prior", "frame")}
-    | {"parameters": "--parameters", "joints": "--joints"}
-    | {"constraints": "--constraint", "rails": "--rails", "robot": "--robot", "loss": "--robust"}
-    | {"kind": "--example"},
-    flags=("loss",),
-    exactly={
-        "model=None": "no --model",
-        "holdout=None": "--holdout none",
-        "prior={name: deviation}": "--prior NAME=DEVIATION",
-        "parameters=['upper.r']": "--parameters upper.r",
-        "out of parameters=": "out of --parameters",
-        "rails=[...] in Measurements": "--rails rail1.csv,rail2.csv,rail3.csv",
-    },
-)
 
 
-def policy(
-    words: Mapping[str, str | None],
-    model: str | None,
-    holdout: str,
-    prior: str | None,
-    constraints: Sequence[str],
-    robust: bool,
-) -> dict[str, Any]:
-    """Keywords of `calibrate`; words: those that it takes as they are. CommandError for what cannot be read."""
-    if words["frame"] not in (None, "fitted", "base"):
-        raise CommandError(f"--frame {words['frame']}: expected fitted or base")
-    if holdout not in ("second", "none"):
-        raise CommandError(f"--holdout {holdout}: expected second or none")
-    return dict(
-        **words,
-        model=int(model) if model is not None and model.isdigit() else model,
-        holdout=None if holdout == "none" else holdout,
-        prior=_prior(prior),
-        constraints=_constraints(constraints),
-        loss="robust" if robust else "linear",
-    )
-
-
-def _prior(text: str | None) -> dict[str, Any] | None:
+def prior_values(text: str | None) -> dict[str, Any] | None:
     """`plate_offset=0.001,arms[0].length=[1.5,0.002]` as deviations, or as pairs of value and deviation."""
     found: dict[str, Any] = {}
     for entry in listed([text] if text else None):
@@ -69,7 +27,7 @@ def _prior(text: str | None) -> dict[str, Any] | None:
     return found or None
 
 
-def _constraints(texts: Sequence[str]) -> dict[str, Any] | None:
+def constraint_values(texts: Sequence[str]) -> dict[str, Any] | None:
     """`arms[0].length=2.05`, `arms[0].length=[2.0,2.1]`, `|arms[0].direction|=1`, `arms[0].length=arms[1].length`."""
     found: dict[str, Any] = {}
     for entry in listed(list(texts)):
@@ -87,8 +45,3 @@ def _constraints(texts: Sequence[str]) -> dict[str, Any] | None:
         numbers = number("--constraint", name, value)
         found[name] = tuple(numbers) if isinstance(numbers, list) and len(numbers) == 2 else numbers
     return found or None
-
-
-def rail_files(text: str | None) -> list[Path]:
-    """The files of `--rails`."""
-    return [Path(name) for name in listed([text] if text else None)]

@@ -1,31 +1,35 @@
 """What `gantrytau calibrate` prints of a calibration."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import typer
 
 from gantrytau.commands.calibrate.calibration_files import PARAMETERS
-from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import About, Calibration, CalibrationVerdict, CrossValidation, MeasuredPlan
+from gantrytau.commands.printing.reporting import print_table
+from gantrytau_optimica import (
+    About,
+    Calibration,
+    CalibrationVerdict,
+    CrossValidation,
+    MeasuredPlan,
+    parameter_rows,
+    report_numbers,
+)
 
 
 def about(
-    found: "Calibration",
+    found: Calibration,
     measured: MeasurementFile,
     robot: str,
-    plan: "MeasuredPlan | None",
-    verdict: "CalibrationVerdict | None",
+    plan: MeasuredPlan | None,
+    verdict: CalibrationVerdict | None,
     notes: Sequence[str],
-    checked: "CrossValidation | None",
-) -> "About":
+    checked: CrossValidation | None,
+) -> About:
     """What a report says besides the calibration. robot: its name; checked: fits without each part of the poses in turn."""
-    from gantrytau_optimica import About
-
     rods = getattr(found, "nominal_rods", None)  # robots on three rods do not turn their plate
     turned = rods is None or rods.turns or measured.data.R is not None
     of_tool = turned or (plan is not None and np.any(plan.target))  # laid over the plan t holds the target
@@ -35,7 +39,7 @@ def about(
         robot=robot,
         facts=facts | {"x, y, z": "the tool" if of_tool else target},
         good=verdict.good if verdict else None,
-        verdict=SPELLING.words(" ".join(verdict.reasons)) if verdict else "",
+        verdict=" ".join(verdict.reasons) if verdict else "",
         notes=list(notes),
         lines=measured.lines,
         numbers=measured.data.numbers,
@@ -43,26 +47,21 @@ def about(
     )
 
 
-def summary(
-    found: "Calibration", measured: MeasurementFile, about: "About", files: list[str]
-) -> dict[str, Any]:
+def summary(found: Calibration, measured: MeasurementFile, about: About) -> dict[str, Any]:
     """The calibration as a record for programs: that of the report, with lines of the file in place of rows."""
-    from gantrytau_optimica import report_numbers
-
     numbers = report_numbers(found, about)
     for name in ("covariance", "verdict", "poses"):  # the report holds them
         del numbers[name]
-    numbers["left_out_lines"] = measured.lines[numbers.pop("left_out_rows")].tolist()
+    numbers["left_out_lines"] = measured.lines[numbers.pop("left_out_rows")]
     numbers["findings"] = [
-        {"kind": f.kind, "lines": measured.lines[f.rows].tolist(), "message": f.message}
-        for f in found.findings
+        {"kind": f.kind, "lines": measured.lines[f.rows], "message": f.message} for f in found.findings
     ]
-    return {"measurements": str(measured.path), **numbers, "files": files}
+    return {"measurements": measured.path, **numbers}
 
 
-def judgement(verdict: "CalibrationVerdict") -> dict[str, Any]:
+def judgement(verdict: CalibrationVerdict) -> dict[str, Any]:
     """A verdict as a record for programs."""
-    words = SPELLING.words(" ".join(verdict.reasons))
+    words = " ".join(verdict.reasons)
     record: dict[str, Any] = {
         "good": verdict.good,
         "validation_error_m": verdict.validation_error,
@@ -73,7 +72,7 @@ def judgement(verdict: "CalibrationVerdict") -> dict[str, Any]:
     return record if verdict.good else {**record, "error": words}
 
 
-def show(found: "Calibration", measured: MeasurementFile, about: "About", files: list[str]) -> None:
+def show(found: Calibration, measured: MeasurementFile, about: About, files: list[str]) -> None:
     """Verdict, error, findings and parameters, readable in a terminal."""
     if about.verdict:
         typer.echo(f"{'Good' if about.good else 'NOT GOOD ENOUGH'}: {about.verdict}")
@@ -99,9 +98,16 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
         typer.echo("Nothing doubtful was found in the measurements")
     for finding in found.findings:
         typer.echo(f"{finding.kind}: {finding.message}")
-    _show_parameters(found)
-    for file in files:
-        typer.echo(f"Written: {file}")
+    rows = [
+        (
+            row.name,
+            "-" if row.value is None else f"{row.value:.7f}",
+            _deviation(row.name, row.deviation),
+            "-" if row.change is None else f"{row.change:+.6f}",
+        )
+        for row in parameter_rows(found)
+    ]
+    print_table(("parameter (m, rad)", "value", "deviation, 1e-6", "from nominal"), rows)
     if not any(file.endswith(PARAMETERS) for file in files):
         typer.echo(
             f"No {PARAMETERS}: {found.robot_name} has no parameters for what was identified; the numbers are in "
@@ -109,7 +115,7 @@ def show(found: "Calibration", measured: MeasurementFile, about: "About", files:
         )
 
 
-def _show_validation(found: "Calibration", about: "About") -> None:
+def _show_validation(found: Calibration, about: About) -> None:
     """Where all poses were fitted, how well fits without them foretell them."""
     if about.validation is None:
         return
@@ -120,7 +126,7 @@ def _show_validation(found: "Calibration", about: "About") -> None:
     )
 
 
-def _show_motion(found: "Calibration") -> None:
+def _show_motion(found: Calibration) -> None:
     motion = found.motion
     if motion is None:
         return
@@ -128,26 +134,6 @@ def _show_motion(found: "Calibration") -> None:
     shift = ", ".join(f"{x:.6f}" for x in motion.translation)
     typer.echo("From the frame of the measurements to the base of the robot, base = R measured + t:")
     typer.echo(f"  R = [{rows}], t = ({shift}) m")
-
-
-def _show_parameters(found: "Calibration") -> None:
-    """Each number with its deviation, and how far it is from the nominal one."""
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    from gantrytau_optimica import parameter_rows
-
-    table = Table(box=SIMPLE, pad_edge=False)
-    table.add_column("parameter (m, rad)", no_wrap=True)
-    for heading in ("value", "deviation, 1e-6", "from nominal"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for row in parameter_rows(found):
-        value = "-" if row.value is None else f"{row.value:.7f}"
-        change = "-" if row.change is None else f"{row.change:+.6f}"
-        table.add_row(Text(row.name), value, _deviation(row.name, row.deviation), change)
-    Console().print(table)
 
 
 def _deviation(name: str, deviation: float | None) -> str:

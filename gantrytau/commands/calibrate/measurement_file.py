@@ -3,16 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from gantrytau import Model
-from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail, refusing
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import CalibrationError, CrossValidation, Finding, Measurements
+from gantrytau.commands.printing.spelling import RUNNING, spelled
+from gantrytau_optimica import (
+    CalibrationError,
+    CrossValidation,
+    Finding,
+    Measurements,
+    calibrate,
+    cross_validate,
+    held_out,
+)
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
 
@@ -22,13 +28,11 @@ class MeasurementFile:
     """A file of measurements, and what of it is to be fitted."""
 
     path: Path
-    data: "Measurements"
+    data: Measurements
 
     @staticmethod
     def read(path: Path, rails: Sequence[Path] = ()) -> "MeasurementFile":
         """CommandError for files that cannot be read."""
-        from gantrytau_optimica import Measurements
-
         with refusing():
             data = Measurements.read(path, rails=list(rails) or None)
         if len(data) and not data.finite.any():
@@ -43,23 +47,22 @@ class MeasurementFile:
         """The line of each row, (N,)."""
         return np.arange(len(self.data)) if self.data.lines is None else self.data.lines
 
-    def words(self, message: str, said: "Sequence[Finding | CalibrationError]") -> str:
-        """A message with lines in place of rows, and options in place of arguments."""
-        from gantrytau_optimica import in_lines
+    def of_file(self, one: Any) -> Any:
+        """A finding or an error with lines in place of rows."""
+        return one if one.kind == OF_GUIDEWAYS else one.in_lines(self.lines)
 
-        rows = [one.rows for one in said if one.kind != OF_GUIDEWAYS]
-        return SPELLING.words(in_lines(message, rows, self.lines) if rows else message)
+    def words(self, finding: Finding) -> str:
+        """A finding with lines in place of rows, and options in place of arguments."""
+        return "".join(RUNNING.get().part(part) for part in self.of_file(finding).parts)
 
 
 def calibrated(
     robot: Model, measured: MeasurementFile, policy: dict[str, Any], *, cross: bool, json: bool
-) -> "CrossValidation":
+) -> CrossValidation:
     """The calibration, whose findings name lines; leaves with a message for data that determine nothing.
 
     cross: fit all poses, and judge by fits without each fifth of them in turn.
     """
-    from gantrytau_optimica import CalibrationError, calibrate, cross_validate, held_out
-
     try:
         with busy(f"calibrating {type(robot).__name__}"):
             if cross:
@@ -78,14 +81,14 @@ def calibrated(
             json,
             kind="SolveError",
         )
-    told = tuple(replace(f, message=measured.words(f.message, [f])) for f in found.findings)
+    told = tuple(replace(f, sentence=measured.words(f)) for f in found.findings)
     if policy["loss"] == "linear":
         _refuse_outliers(float(found.error), told, measured, json)
     return replace(checked, calibration=found.with_findings(told))
 
 
 def _refuse_outliers(
-    error: float, findings: "Sequence[Finding]", measured: MeasurementFile, json: bool
+    error: float, findings: Sequence[Finding], measured: MeasurementFile, json: bool
 ) -> None:
     """Leave with a message if gross errors pull at the parameters."""
     for finding in findings:
@@ -97,15 +100,15 @@ def _refuse_outliers(
                 json,
                 kind="CalibrationError",
                 finding=finding.kind,
-                lines=measured.lines[finding.rows].tolist(),
+                lines=measured.lines[finding.rows],
             )
 
 
-def _refuse(error: "CalibrationError", measured: MeasurementFile, json: bool) -> NoReturn:
-    message = measured.words(str(error), [error, *error.findings]).replace("Measurements: ", "", 1)
+def _refuse(error: CalibrationError, measured: MeasurementFile, json: bool) -> NoReturn:
+    message = spelled(measured.of_file(error))
     others = [f for f in error.findings if f.kind != error.kind]
-    more = "".join(f"\n  {f.kind}: {measured.words(f.message, [f])}" for f in others)
-    rows = [] if error.kind == OF_GUIDEWAYS else measured.lines[error.rows].tolist()
+    more = "".join(f"\n  {f.kind}: {measured.words(f)}" for f in others)
+    rows = [] if error.kind == OF_GUIDEWAYS else measured.lines[error.rows]
     fail(
         f"{measured.path}: {message}{more}\nNothing was written",
         FAULT,

@@ -2,19 +2,16 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import typer
 
 from gantrytau import Model, ModelError
 from gantrytau.commands.calibrate import calibration_files, calibration_summary
-from gantrytau.commands.calibrate.calibration_options import SPELLING
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile, calibrated
-from gantrytau.commands.printing.reporting import FAULT, as_json, note, writable
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import MeasuredPlan, PlannedCell
+from gantrytau.commands.printing.reporting import FAULT, answered, note, writable
+from gantrytau_optimica import MeasuredPlan, PlannedCell, measured_plan, told_by_tool
 
 FEW = 60  # poses, fewer than which are all fitted, and left out in turn
 LAID_OVER = (
@@ -30,7 +27,7 @@ class NominalRobot:
 
     model: Model
     name: str
-    planned: "PlannedCell | None"
+    planned: PlannedCell | None
 
 
 def finish(
@@ -46,8 +43,6 @@ def finish(
 
     validate: fit all of few poses, as a plan asks for, and judge by fits without each fifth of them in turn.
     """
-    from gantrytau_optimica import told_by_tool
-
     plan, notes = _laid_over(robot.planned, measured, policy["frame"]), []
     policy = dict(policy, frame=policy["frame"] or "fitted")
     if plan is not None:
@@ -70,32 +65,27 @@ def finish(
     about = calibration_summary.about(
         found, measured, robot.name, plan, verdict, notes, checked if cross else None
     )
-    written = calibration_files.write(found, folder, robot.name, measured.path, about)
-    if json:
-        record = calibration_summary.summary(found, measured, about, written)
-        if plan is not None and verdict is not None:
-            missing = {"missing": plan.missing, "program": str(plan.rest_program)} if plan.missing else {}
-            record |= missing | calibration_summary.judgement(verdict)
-        typer.echo(as_json({**record, "notes": notes}))
-    else:
-        calibration_summary.show(found, measured, about, written)
+    files = calibration_files.write(found, folder, robot.name, measured.path, about)
+    record = {**calibration_summary.summary(found, measured, about), "notes": notes}
+    if plan is not None and verdict is not None:
+        missing = {"missing": plan.missing, "program": plan.rest_program} if plan.missing else {}
+        record |= missing | calibration_summary.judgement(verdict)
+    answered(json, record, lambda: calibration_summary.show(found, measured, about, files), files)
     if verdict is not None and not verdict.good:
         raise typer.Exit(FAULT)
 
 
-def _laid_over(planned: "PlannedCell | None", measured: MeasurementFile, frame: Any) -> "MeasuredPlan | None":
+def _laid_over(planned: PlannedCell | None, measured: MeasurementFile, frame: Any) -> MeasuredPlan | None:
     """The measurements as those of the plan; its complaints with the file."""
-    from gantrytau_optimica import measured_plan
-
     if planned is None:
         return None
     try:
         return measured_plan(planned, measured.data, frame)
     except ModelError as error:
-        raise ModelError(f"{measured.path}: {SPELLING.words(str(error))}. Nothing was written") from error
+        raise ModelError(*error.parts, ". Nothing was written", place=str(measured.path)) from error
 
 
-def _as_planned(plan: "MeasuredPlan", policy: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
+def _as_planned(plan: MeasuredPlan, policy: dict[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """Keywords of `calibrate` with the prior of the plan's own simulations, unless another was given; words on it."""
     notes = [] if plan.motion is None else [LAID_OVER]
     policy, off = dict(policy, frame=plan.frame), f"{np.linalg.norm(plan.target) * 1e3:.4g} mm"
@@ -109,7 +99,7 @@ def _as_planned(plan: "MeasuredPlan", policy: dict[str, Any]) -> tuple[dict[str,
     return dict(policy, prior=plan.prior), [*notes, f"prior: {told}, as the plan expects"]
 
 
-def _write_rest(plan: "MeasuredPlan", *, first: bool = False) -> None:
+def _write_rest(plan: MeasuredPlan, *, first: bool = False) -> None:
     """Write the program of what is missing; first: only if there is none yet, as what was measured could not be used."""
     if not plan.missing:
         return

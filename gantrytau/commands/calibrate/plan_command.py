@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
@@ -16,15 +16,13 @@ from gantrytau.commands.printing.reporting import (
     FAULT,
     INTERRUPTED,
     CommandError,
-    as_json,
+    answered,
     fail,
     note,
     refusing,
 )
-from gantrytau.commands.printing.spelling import Spelling
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import CalibrationPlan, PlannedCell
+from gantrytau.commands.printing.spelling import RUNNING
+from gantrytau_optimica import CalibrationPlan, PlannedCell, plan_cell, read_cell
 
 EXAMPLES = ("l1", "six", "f1")  # kinds of cells to begin with
 STAGES = {
@@ -35,25 +33,17 @@ STAGES = {
     "trials": "simulated calibrations",
     "verdict": "verdict",
 }
-SPELLING = Spelling(
-    ("plan_calibration", "Limits"),
-    {
-        "wanted": "goal.error",
-        "poses": "goal.poses",
-        "tape": "robot.tape",
-        "limits": "limits",
-        "device": "device",
-    }
-    | {"strokes": "limits.strokes", "facing": "device.facing"}
-    | {name: f"plan.{name}" for name in ("robots", "seed", "spacing", "places", "margin", "home")}
-    | {"folder": "--output"},
-    exactly={
-        "obstacles[": "limits.obstacles[",
-        "plate[": "limits.plate[",
-        ", or box=, a slice for example": "",
-        "another folder, or move": "another folder with --output, or move",
-    },
-)
+NAMES = {  # keys of the file by argument
+    "wanted": "goal.error",
+    "poses": "goal.poses",
+    "tape": "robot.tape",
+    "limits": "limits",
+    "device": "device",
+    "strokes": "limits.strokes",
+    "facing": "device.facing",
+    **{name: f"plan.{name}" for name in ("robots", "seed", "spacing", "places", "margin", "home")},
+    "folder": "--output",
+}
 
 
 @dataclass
@@ -81,8 +71,6 @@ def model_of_cell(name: str) -> Model:
 
 def plan(file: Path, output: Path | None, json: bool) -> None:
     """Plan what to measure, write it, and print the verdict; leaves with exit code 1 if that is not good."""
-    from gantrytau_optimica import plan_cell, read_cell
-
     with refusing():
         cell = read_cell(file, model_of_cell)
     folder = output or folder_beside(file)
@@ -98,24 +86,21 @@ def plan(file: Path, output: Path | None, json: bool) -> None:
     except ModelError as error:
         with suppress(OSError):  # a folder that was made for nothing
             folder.rmdir()
+        message = RUNNING.get().with_names(NAMES).message(error)
         if error.argument == "folder":
-            raise CommandError(SPELLING.of(error)) from error
-        raise ModelError(f"{file}: {SPELLING.of(error)}") from error
-    found, files = planned.plan, [str(path) for path in planned.files]
+            raise CommandError(message) from error
+        raise ModelError(message, place=str(file)) from error
+    found = planned.plan
     good, reasons = found.verdict.good, "\n".join(found.verdict.reasons)
-    if json:
-        wrong = {} if good else {"error": reasons, "kind": "verdict"}
-        typer.echo(as_json({**summary(found), "files": files, **wrong}))
-    else:
-        typer.echo(str(found))
-        for name in files:
-            typer.echo(f"Written: {name}")
+    wrong = {} if good else {"error": reasons, "kind": "verdict"}
+    answered(json, {**summary(found), **wrong}, str(found), planned.files)
+    if not json:
         typer.echo(_next(planned, file))
     if not good:
         raise typer.Exit(FAULT)
 
 
-def _next(planned: "PlannedCell", file: Path) -> str:
+def _next(planned: PlannedCell, file: Path) -> str:
     """What to do with a plan."""
     few = planned.plan.few_robots
     safe = f"Safe: {planned.plan.safety}\n" if few else ""
@@ -129,7 +114,7 @@ def _next(planned: "PlannedCell", file: Path) -> str:
     )
 
 
-def summary(found: "CalibrationPlan") -> dict[str, Any]:
+def summary(found: CalibrationPlan) -> dict[str, Any]:
     """A plan as a record for programs."""
     return {
         "robot": found.robot_name,
@@ -138,7 +123,7 @@ def summary(found: "CalibrationPlan") -> dict[str, Any]:
         "wanted_m": found.verdict.wanted,
         "error_m": found.verdict.error,
         "predicted_error_m": float(found.prediction.error),
-        "simulated": {"before_m": found.trials.before.tolist(), "after_m": found.trials.after.tolist()},
+        "simulated": {"before_m": found.trials.before, "after_m": found.trials.after},
         "poses": int(found.measured.sum()),
         "passed": int((~found.measured).sum()),
     }

@@ -1,23 +1,28 @@
 """`cell.toml`: a plant, a controller of the user, references, limits, parameters, and what happens when."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from gantrytau import did_you_mean, read_toml
-from gantrytau.border import NamedObject, load, similar
+from gantrytau import ModelError, read_toml
+from gantrytau.border import NamedObject, Value, named, read_table
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.printing.reporting import CommandError, refusing
+from gantrytau_fmu.controller import AxisLimits, Channel, Client, Controller, Declaration, RemoteClient
 
-if TYPE_CHECKING:
-    from gantrytau_fmu.controller import Controller
-
-PLAIN = ("plant", "law", "period", "state", "clock", "patience", "clients", "kinematics")
-TABLES = ("references", "limits", "parameters", "wires", "starts", "places")
-LIMITS, EVENT = ("minimum", "maximum", "speed"), ("at", "state", "set", "value")
-PARAMETER = ("value", "unit", "minimum", "maximum")
-CHANNEL = ("unit", "size", "minimum", "maximum")
+LIBRARY = "gantrytau_models"
+ANY, TEXT = Value("any"), Value("text")
+KEYS = {
+    **dict.fromkeys(("plant", "law", "kinematics"), TEXT),
+    **dict.fromkeys(("period", "state", "clock", "patience"), ANY),
+    **dict.fromkeys(("references", "limits", "parameters", "wires", "starts", "places"), Value("table")),
+    "clients": Value("texts"),
+    "event": Value("table", ((None,),)),
+}
+LIMITS: dict[str, Value] = dict.fromkeys(("minimum", "maximum", "speed"), ANY)
+EVENT: dict[str, Value] = dict.fromkeys(("at", "state", "set", "value"), ANY)
+PARAMETER: dict[str, Value] = dict.fromkeys(("value", "unit", "minimum", "maximum"), ANY)
+CHANNEL: dict[str, Value] = dict.fromkeys(("unit", "size", "minimum", "maximum"), ANY)
 FILES = (".fmu", ".so", ".dylib", ".dll")
 EXAMPLE = """\
 # A robot under a controller, every 4 ms. Make this file your own, then: gantrytau controller run cell.toml --stop 0.5
@@ -55,82 +60,51 @@ value = [1.0, 3.05, -0.35]
 """
 
 
-def read_controller(file: Path, clock: str | None = None) -> "Controller":
+def read_controller(file: Path, clock: str | None = None) -> Controller:
     """The controller that a file describes, with another clock if one is given; CommandError for what is wrong in it."""
-    from gantrytau_fmu.controller import Controller
-
     with refusing():
-        table = read_toml(file)
-    _check(file, table)
+        table = read_table(f"{file}: ", read_toml(file), KEYS, ("plant", "law"))
     keywords: dict[str, Any] = {
         key: table[key] for key in ("period", "state", "clock", "patience") if key in table
     }
     if clock is not None:
         keywords["clock"] = clock
-    references = table.get("references", {})
-    keywords["references"] = dict(_reference(file, name, value) for name, value in references.items())
+    keywords["references"] = dict(
+        signal(f"{name}={value}", f"{file}: references:")
+        for name, value in table.get("references", {}).items()
+    )
     keywords |= {key: table[key] for key in ("wires", "starts") if table.get(key)}
     with refusing(f"{file}: "):
-        keywords["limits"], keywords["parameters"] = _limits(file, table), _parameters(file, table)
+        keywords["limits"] = {
+            name: AxisLimits(**read_table(f"limits.{name}", own, LIMITS))
+            for name, own in table.get("limits", {}).items()
+        }
+        keywords["parameters"] = dict(
+            _parameter(name, own) for name, own in table.get("parameters", {}).items()
+        )
         if "kinematics" in table:
-            keywords["kinematics"] = _named(file, str(table["kinematics"]))
+            keywords["kinematics"] = named(table["kinematics"], file.parent, LIBRARY)
         clients = [_client(file, name) for name in table.get("clients", [])]
-        clients += [_place(file, name, own) for name, own in table.get("places", {}).items()]
+        clients += [_place(name, own) for name, own in table.get("places", {}).items()]
         parts = (_part(file, table["plant"]), _part(file, table["law"]))
         controller = Controller(*parts, clients=clients, **keywords)
         for k, event in enumerate(table.get("event", [])):
-            _plan(controller, f"{file}: event[{k}]", event)
+            _plan(controller, f"event[{k}]", event)
     return controller
-
-
-def _reference(file: Path, name: str, value: Any) -> tuple[str, Any]:
-    """A reference by its name; CommandError in the words of the file."""
-    try:
-        return signal(f"{name}={value}")
-    except CommandError as error:
-        raise CommandError(f"{file}: {str(error).replace('--input', 'references:', 1)}") from None
-
-
-def _check(file: Path, table: Mapping[str, Any]) -> None:
-    """CommandError for keys that are unknown or missing, and for tables that are none."""
-    known = (*PLAIN, *TABLES, "event")
-    for key, value in table.items():
-        if key not in known:
-            raise CommandError(f"{file}: there is no key '{key}'{did_you_mean(key, known)}")
-        if key in TABLES and not isinstance(value, dict):
-            raise CommandError(
-                f"{file}: found {key} = {value!r}, expected a table: a line [{key}], then name = value"
-            )
-        if key in ("clients", "event") and not isinstance(value, list):
-            raise CommandError(
-                f"{file}: found {key} = {value!r}, expected a list" + ", [[event]]" * (key == "event")
-            )
-    for key in ("plant", "law"):
-        if not isinstance(table.get(key), str):
-            raise CommandError(
-                f"{file}: found {key} = {table.get(key)!r}, expected a text; `gantrytau controller run --example` prints a "
-                "whole file"
-            )
 
 
 def _part(file: Path, text: str) -> Any:
     """A plant or a law: a file, a model, or what a Python file names."""
     if text.lower().endswith(FILES):
         return file.parent / text
-    choice = NamedObject.read(text)
-    if choice.file is None:
+    if NamedObject.read(text).file is None:
         return build(text).model
-    found = _named(file, text)
-    return build(f"{file.parent.absolute() / text}").model if isinstance(found, type) else found
+    return named(text, file.parent, LIBRARY)
 
 
-def _client(file: Path, text: Any) -> Any:
-    from gantrytau_fmu.controller import Client
-
-    if not isinstance(text, str):
-        raise CommandError(f"{file}: clients: found {text!r}, expected names in quotes, as cell.py:probe")
-    found = _named(file, text)
-    if not callable(found) or (isinstance(found, Client) and not isinstance(found, type)):
+def _client(file: Path, text: str) -> Any:
+    found = named(text, file.parent, LIBRARY)
+    if not callable(found) or isinstance(found, Client):
         return found
     try:
         return found()
@@ -141,75 +115,31 @@ def _client(file: Path, text: Any) -> Any:
         ) from error
 
 
-def _place(file: Path, name: str, sends: Any) -> Any:
+def _place(name: str, sends: Any) -> RemoteClient:
     """A place for a client over the network, and what it sends."""
-    from gantrytau_fmu.controller import Channel, Declaration, RemoteClient
-
-    if not isinstance(sends, dict):
-        raise CommandError(
-            f"{file}: places.{name}: found {sends!r}, expected what it sends, as delta = {{ unit = 'm' }}"
-        )
+    tables = read_table(f"places.{name}", sends, dict.fromkeys(sends, Value("table"))) if sends else {}
     channels = []
-    for channel, own in sends.items():
-        keys = _keys(f"{file}: places.{name}.{channel}", own, CHANNEL)
+    for channel, own in tables.items():
+        keys = read_table(f"places.{name}.{channel}", own, CHANNEL)
         channels.append(Channel(channel, keys.pop("unit", "1"), **keys))
     return RemoteClient(name, Declaration(channels))
 
 
-def _named(file: Path, text: str) -> Any:
-    """What a Python file beside this one names."""
-    choice = NamedObject.read(f"{file.parent.absolute() / text}")
-    if choice.file is None or not choice.name:
-        raise CommandError(
-            f"{file}: found '{text}', expected a Python file and a name in it, as cell.py:probe"
-        )
-    there = {name: value for name, value in vars(load(choice.file)).items() if not name.startswith("_")}
-    if choice.name not in there:
-        raise CommandError(f"{file}: {choice.file.name} has no '{choice.name}'{similar(choice.name, there)}")
-    return there[choice.name]
+def _parameter(name: str, own: Any) -> tuple[Channel, Any]:
+    keys = read_table(f"parameters.{name}", own, PARAMETER, ("value",))
+    value = keys.pop("value")
+    size = len(value) if isinstance(value, list) else 1
+    return Channel(name, keys.pop("unit", "1"), size, **keys), value
 
 
-def _limits(file: Path, table: Mapping[str, Any]) -> dict[str, Any]:
-    from gantrytau_fmu.controller import AxisLimits
-
-    limits = table.get("limits", {})
-    return {name: AxisLimits(**_keys(f"{file}: limits.{name}", own, LIMITS)) for name, own in limits.items()}
-
-
-def _parameters(file: Path, table: Mapping[str, Any]) -> dict[Any, Any]:
-    from gantrytau_fmu.controller import Channel
-
-    found = {}
-    for name, own in table.get("parameters", {}).items():
-        place = f"{file}: parameters.{name}"
-        keys = _keys(place, own, PARAMETER)
-        if "value" not in keys:
-            raise CommandError(f"{place}: found no value, expected one, as value = 1.0")
-        value = keys.pop("value")
-        found[Channel(name, keys.pop("unit", "1"), len(value) if isinstance(value, list) else 1, **keys)] = (
-            value
-        )
-    return found
-
-
-def _plan(controller: "Controller", place: str, event: Any) -> None:
-    keys = _keys(place, event, EVENT)
-    if "at" not in keys or ("state" in keys) == ("set" in keys) or ("set" in keys) != ("value" in keys):
-        raise CommandError(f"{place}: found {event!r}, expected at with state, or at with set and value")
-    with refusing(f"{place}: "):
-        if "set" in keys:
-            controller.set(keys["set"], keys["value"], at=keys["at"])
-            return
-        switches = {"idle": controller.idle, "submit": controller.submit, "obtain": controller.obtain}
-        if keys["state"] not in switches:
-            raise CommandError(f"found state = {keys['state']!r}, expected {', '.join(switches)}")
-        switches[keys["state"]](at=keys["at"])
-
-
-def _keys(place: str, table: Any, known: tuple[str, ...]) -> dict[str, Any]:
-    if not isinstance(table, dict):
-        raise CommandError(f"{place}: found {table!r}, expected a table with {', '.join(known)}")
-    for key in table:
-        if key not in known:
-            raise CommandError(f"{place}: there is no key '{key}'{did_you_mean(key, known)}")
-    return dict(table)
+def _plan(controller: Controller, place: str, event: Any) -> None:
+    keys = read_table(place, event, EVENT, ("at",))
+    if ("state" in keys) == ("set" in keys) or ("set" in keys) != ("value" in keys):
+        raise ModelError(f"{place}: found {event!r}, expected at with state, or at with set and value")
+    if "set" in keys:
+        controller.set(keys["set"], keys["value"], at=keys["at"])
+        return
+    switches = {"idle": controller.idle, "submit": controller.submit, "obtain": controller.obtain}
+    if keys["state"] not in switches:
+        raise ModelError(f"{place}: found state = {keys['state']!r}, expected {', '.join(switches)}")
+    switches[keys["state"]](at=keys["at"])

@@ -8,9 +8,7 @@ from typing import Annotated
 import typer
 
 from gantrytau.commands.printing.reporting import reporting
-from gantrytau.commands.printing.spelling import Spelling
-
-SPELLING = Spelling(("controller",), {"token": "--token", "port": "--web"})
+from gantrytau_fmu.controller.panel import PanelLink, WebPanel, terminal_panel
 
 
 def panel(
@@ -31,18 +29,19 @@ def panel(
 
     Enter idle, submit, obtain, set NAME VALUE, or quit. It ends when the controller does, or at Ctrl-C.
     """
-    with reporting(False, None, SPELLING):
-        from gantrytau_fmu.controller.panel import PanelLink, WebPanel, terminal_panel
+    with (
+        reporting(False, None, {"port": "--web"}),
+        contextlib.suppress(KeyboardInterrupt),
+        PanelLink((host, port), token=token) as link,
+    ):
+        if web is None:
+            from rich.console import Console
 
-        with contextlib.suppress(KeyboardInterrupt), PanelLink((host, port), token=token) as link:
-            if web is None:
-                from rich.console import Console
-
-                terminal_panel(link, Console(), sys.stdin)
-            else:
-                with WebPanel(link, port=web) as page:
-                    typer.echo(f"The panel is at {page.url}")
-                    while not link.ended:
-                        time.sleep(0.1)
-            if link.ended:
-                typer.echo(f"The controller ended: {link.ended}")
+            terminal_panel(link, Console(), sys.stdin)
+        else:
+            with WebPanel(link, port=web) as page:
+                typer.echo(f"The panel is at {page.url}")
+                while not link.ended:
+                    time.sleep(0.1)
+        if link.ended:
+            typer.echo(f"The controller ended: {link.ended}")

@@ -1,39 +1,34 @@
 """`gantrytau controller stream`: a CSV file to a controller that serves, a row for each sample."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import INTERRUPTED, CommandError, as_json, reporting
-from gantrytau.commands.printing.spelling import Spelling
-
-SPELLING = Spelling(("controller",), {"at_end": "--at-end", "transport": "--tcp"})
+from gantrytau.commands.printing.reporting import INTERRUPTED, as_json, reporting
+from gantrytau_fmu.controller import run_client, stream_file
 
 
+@serves(stream_file, name="Its place at the controller.", at_end="After the last row: hold it, or stop.")
 def stream(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="CSV, as learning control writes corrections.")
     ],
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the controller.")],
     host: Annotated[str, typer.Option(help="Where it runs.")] = "127.0.0.1",
-    name: Annotated[str, typer.Option(help="Its place at the controller.")] = "stream",
-    at_end: Annotated[str, typer.Option(help="hold the last row, or stop.")] = "hold",
     tcp: Annotated[bool, typer.Option("--tcp", help="By a connection instead of datagrams.")] = False,
     token: Annotated[str, typer.Option(help="Of the controller; needed from elsewhere.")] = "",
     json: Json = False,
+    **policy: Any,
 ) -> None:
     """Stream a file to a controller: a row for each sample, from the moment that f_activate goes from 0 to 1.
 
     It ends when the controller does, or at Ctrl-C.
     """
-    with reporting(json, None, SPELLING):
-        from gantrytau_fmu.controller import run_client, stream_file
-
-        if at_end not in ("hold", "stop"):
-            raise CommandError(f"--at-end {at_end}: expected hold or stop")
-        client = stream_file(file, name=name, at_end="hold" if at_end == "hold" else "stop")
+    with reporting(json, None, {"transport": "--tcp"}):
+        client = stream_file(file, **policy)
         transport = "tcp" if tcp else "udp"
         attended = run_client(client, (host, port), transport=transport, token=token)
         told = {
@@ -42,11 +37,7 @@ def stream(
             "ended": attended.ended,
             "state": client.state,
         }
-        if json:
-            typer.echo(as_json(told))
-        else:
-            typer.echo(
-                f"{attended.answers} answers to {attended.samples} samples; {attended.ended}; {client.state}"
-            )
+        words = f"{attended.answers} answers to {attended.samples} samples; {attended.ended}; {client.state}"
+        typer.echo(as_json(told) if json else words)
         if attended.ended == "interrupted":
             raise typer.Exit(INTERRUPTED)

@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import Columns, FlatModel, ModelError, Samples, did_you_mean
+from gantrytau.border import Value, read_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,14 +96,11 @@ def _names(flat: FlatModel, inputs: bool) -> list[str]:
 
 
 def _pairs(place: str, asked: Any) -> dict[str, str]:
-    if isinstance(asked, str):
-        return {asked: asked}
-    if isinstance(asked, list) and all(isinstance(name, str) for name in asked):
-        return {name: name for name in asked}
-    if isinstance(asked, dict) and all(isinstance(column, str) for column in asked.values()):
-        return dict(asked)
-    if asked is None:
-        return {}
+    """Columns by the variables that they measure."""
+    names = asked if isinstance(asked, list) else [asked] if asked is not None else []
+    pairs = dict(asked if isinstance(asked, dict) else zip(names, names, strict=True))
+    if all(isinstance(name, str) for name in (*pairs, *pairs.values())):
+        return pairs
     raise ModelError(
         f'{place}.measured: found {asked!r}, expected names, as ["x", "y"], or {{ x = "its column" }}'
     )
@@ -113,14 +111,5 @@ def _deviations(place: str, names: list[str], deviation: Any) -> dict[str, float
     if deviation is None:
         return {}
     found: dict[str, Any] = deviation if isinstance(deviation, dict) else dict.fromkeys(names, deviation)
-    for name, value in found.items():
-        if name not in names:
-            raise ModelError(
-                f"{place}.deviation: '{name}' is not among the measured{did_you_mean(name, names)}"
-            )
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < np.inf:
-            raise ModelError(f"{place}.deviation: found {value!r}, expected a number above 0, in SI")
-    for name in names:
-        if name not in found:
-            raise ModelError(f"{place}.deviation: found none of {name}, expected one for each, or for none")
-    return {name: float(value) for name, value in found.items()}
+    keys = dict.fromkeys(names, Value("1", above=0.0))
+    return read_table(f"{place}.deviation", found, keys, needed=tuple(names))

@@ -1,23 +1,35 @@
 """The file of an estimation: a model, what is estimated, and experiments with their data."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gantrytau import FlatModel, ModelError, did_you_mean, flatten, read_toml
-from gantrytau.border import NamedObject
+from gantrytau.border import NamedObject, Value, read_table
 from gantrytau.commands.arguments.model_choice import Chosen, build
 from gantrytau.commands.arguments.values import signal
 from gantrytau.commands.estimate.data_columns import Data
-from gantrytau.commands.printing.reporting import CommandError, refusing
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import Experiment, Free
+from gantrytau.commands.printing.reporting import refusing
+from gantrytau_optimica import Experiment, Free
 
 POLICY = ("loss", "elements", "points", "scheme", "tolerance", "max_iterations", "max_time")
-FREE = ("guess", "min", "max")
-PARTS = ("name", "data", "measured", "deviation", "inputs", "start", "set", "begin", "stop", "held")
+NUMBERS = Value("1", ((), (None,), (None, None)))
+FREE: dict[str, Value] = dict.fromkeys(("guess", "min", "max"), NUMBERS)
+KEYS = {
+    "model": Value("text"),
+    **dict.fromkeys(POLICY, Value("any")),
+    "estimate": Value("table"),
+    "set": Value("table"),
+    "experiment": Value("table", ((None,),)),
+}
+PARTS = {
+    **dict.fromkeys(("name", "data"), Value("text")),
+    **dict.fromkeys(("measured", "deviation"), Value("any")),
+    **dict.fromkeys(("inputs", "start", "set"), Value("table")),
+    **dict.fromkeys(("begin", "stop"), Value("s")),
+    "held": Value("texts"),
+}
 EXAMPLE = """\
 # Length and drag of a pendulum from a film of its swing. Make this file your own, then: gantrytau estimate swing.toml
 # This one takes its data from a simulation: gantrytau simulate Pendulum --stop 6 --set L=0.9 --set damping=0.15 \\
@@ -55,40 +67,28 @@ class EstimateFile:
     text: str
     chosen: Chosen
     flat: FlatModel
-    parameters: Mapping[str, "Free"]
-    experiments: tuple["Experiment", ...]
+    parameters: Mapping[str, Free]
+    experiments: tuple[Experiment, ...]
     keywords: Mapping[str, Any]
 
 
 def read_estimate(file: Path) -> EstimateFile:
     """The estimation that a file describes; CommandError for what is missing, unknown or of the wrong kind."""
     with refusing():
-        table = read_toml(file)
-    _check_keys(file, "", table, ("model", *POLICY, "estimate", "set", "experiment"))
-    if not isinstance(table.get("model"), str):
-        raise CommandError(
-            f'{file}: found model = {table.get("model")!r}, expected a name in quotes, as model = "Pendulum"; '
-            "`gantrytau estimate --example` prints a whole file"
-        )
-    for key in ("estimate", "set"):
-        if not isinstance(table.get(key, {}), dict):
-            raise CommandError(
-                f"{file}: found {key} = {table[key]!r}, expected a table: a line [{key}], then name = value"
-            )
-    trials = table.get("experiment")
-    if not isinstance(trials, list) or not all(isinstance(one, dict) for one in trials) or not trials:
-        raise CommandError(f"{file}: found no experiment, expected a line [[experiment]], then its data")
+        table = read_table(f"{file}: ", read_toml(file), KEYS, ("model", "experiment"))
     text = _beside(file, table["model"])
     chosen = build(text)
     flat = flatten(chosen.model)
-    known = {n for p in flat.parameters for n in (p.name, *p.elements)}
     with refusing(f"{file}: "):
         parameters = {
-            name: _free(flat, f"estimate.{name}", name, value, known)
+            name: _free(flat, f"estimate.{name}", name, value, flat.parameters)
             for name, value in table.get("estimate", {}).items()
         }
-        common = {name: _known(f"set.{name}", value) for name, value in table.get("set", {}).items()}
-        experiments = [_experiment(file, flat, k, one, common) for k, one in enumerate(trials)]
+        common = _values(flat, "set", table.get("set", {}), ())
+        experiments = [
+            _experiment(file, flat, f"experiment[{k}]", one, common)
+            for k, one in enumerate(table["experiment"])
+        ]
     keywords = {key: table[key] for key in POLICY if key in table}
     return EstimateFile(text, chosen, flat, parameters, tuple(experiments), keywords)
 
@@ -98,106 +98,58 @@ def _beside(file: Path, text: str) -> str:
     return text if NamedObject.read(text).file is None else f"{file.parent.absolute() / text}"
 
 
-def _check_keys(file: Path, place: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
-    for key in table:
-        if key not in known:
-            raise CommandError(f"{file}: {place}there is no key '{key}'{did_you_mean(key, known)}")
-
-
-def _experiment(
-    file: Path, flat: FlatModel, number: int, table: Mapping[str, Any], common: Mapping[str, Any]
-) -> "Experiment":
+def _experiment(file: Path, flat: FlatModel, place: str, asked: Any, common: Mapping[str, Any]) -> Experiment:
     """One experiment; ModelError or CommandError with its place in the file."""
-    from gantrytau_optimica import Experiment
-
-    place = f"experiment[{number}]"
-    _check_keys(file, f"{place}: ", table, PARTS)
-    if not isinstance(table.get("data"), str):
-        raise ModelError(
-            f'{place}: found data = {table.get("data")!r}, expected a file in quotes, as "swing.csv"'
-        )
-    for key in ("inputs", "start", "set"):
-        if not isinstance(table.get(key, {}), dict):
-            raise ModelError(f"{place}.{key}: found {table[key]!r}, expected {{ name = value }}")
+    table = read_table(place, asked, PARTS, ("data",))
     columns = Data.read(file.parent / table["data"])
-    variables = {n for v in flat.variables for n in (v.name, *v.elements)}
     part = columns.part(table.get("begin"), table.get("stop"))
     if part.times is not None and not part.times.size:
         raise ModelError(f"{place}: found no data between begin and stop, expected some; widen them")
     measured = part.measured(flat, place, table.get("measured"), table.get("deviation"))
-    starts = {
-        name: _free(flat, f"{place}.start.{name}", name, value, variables)
-        if isinstance(value, dict)
-        else _known(f"{place}.start.{name}", value)
-        for name, value in table.get("start", {}).items()
-    }
-    known = {n for p in flat.parameters for n in (p.name, *p.elements)}
-    own = {
-        name: _free(flat, f"{place}.set.{name}", name, value, known)
-        if isinstance(value, dict)
-        else _known(f"{place}.set.{name}", value)
-        for name, value in table.get("set", {}).items()
-    }
-    ends = {key: table[key] for key in ("begin", "stop", "name") if key in table}
-    try:
-        return Experiment(
-            measured,
-            _inputs(file, flat, place, table, columns),
-            starts,
-            parameters={**common, **own},
-            **_part(columns, ends),
-        )
-    except ModelError as error:
-        raise ModelError(f"{place}: {str(error).removeprefix('Experiment: ')}") from error
-
-
-def _part(columns: Data, ends: Mapping[str, Any]) -> dict[str, Any]:
-    """Begin and stop, by default those of the data."""
+    starts = _values(flat, f"{place}.start", table.get("start", {}), flat.variables)
+    own = _values(flat, f"{place}.set", table.get("set", {}), flat.parameters)
+    inputs = _inputs(file, flat, place, table, columns)
     first = {} if columns.times is None else {"begin": float(columns.times[0])}
-    return {**first, **ends}
+    ends = {**first, **{key: table[key] for key in ("begin", "stop", "name") if key in table}}
+    try:
+        return Experiment(measured, inputs, starts, parameters={**common, **own}, **ends)
+    except ModelError as error:
+        raise error.within(place) from error
 
 
 def _inputs(
     file: Path, flat: FlatModel, place: str, table: Mapping[str, Any], columns: Data
 ) -> dict[str, Any]:
     """What the file says of inputs, and columns that have their names."""
-    held = table.get("held", [])
-    if not isinstance(held, list) or not all(isinstance(name, str) for name in held):
-        raise ModelError(f'{place}.held: found {held!r}, expected a list of inputs, as ["u"]')
-    found = columns.inputs(flat, place, held)
+    found = columns.inputs(flat, place, table.get("held", []))
     for name, value in table.get("inputs", {}).items():
-        text = f"{name}={value}"
         path, dot, rest = str(value).rpartition(".csv")
         if dot and (not rest or rest.startswith(":")):
-            text = f"{name}={file.parent.absolute() / (path + dot)}{rest}"
-        try:
-            found |= dict([signal(text)])
-        except CommandError as error:
-            raise CommandError(str(error).replace("--input", f"{place}.inputs:", 1)) from None
+            value = f"{file.parent.absolute() / (path + dot)}{rest}"
+        found |= dict([signal(f"{name}={value}", f"{place}.inputs:")])
     return found
 
 
-def _known(place: str, value: Any) -> Any:
-    """A number, or numbers."""
-    if isinstance(value, bool) or not _numeric(value):
-        raise ModelError(f"{place}: found {value!r}, expected a number, or a list of numbers, in SI")
-    return value
+def _values(flat: FlatModel, place: str, table: Mapping[str, Any], free: Sequence[Any]) -> dict[str, Any]:
+    """Numbers by name, and what is to be estimated among the quantities `free`, as a table."""
+    return {
+        name: _free(flat, f"{place}.{name}", name, value, free)
+        if isinstance(value, dict) and free
+        else NUMBERS.read(f"{place}.{name}", value)
+        for name, value in table.items()
+    }
 
 
-def _free(flat: FlatModel, place: str, name: str, value: Any, known: set[str]) -> "Free":
+def _free(flat: FlatModel, place: str, name: str, value: Any, quantities: Sequence[Any]) -> Free:
     """What is to be estimated, with a guess of the file or of the model, and limits."""
-    from gantrytau_optimica import Free
-
+    known = {n for q in quantities for n in (q.name, *q.elements)}
     if name not in known:
         raise ModelError(f"{place}: the model has no '{name}'{did_you_mean(name, known)}")
     if not isinstance(value, dict):
-        return Free(_known(place, value))
-    for key, number in value.items():
-        if key not in FREE:
-            raise ModelError(f"{place}: there is no key '{key}'{did_you_mean(key, FREE)}")
-        _known(f"{place}.{key}", number)
-    guess = value["guess"] if "guess" in value else _own(flat, place, name)
-    return Free(guess, min=value.get("min"), max=value.get("max"))
+        return Free(NUMBERS.read(place, value))
+    limits = read_table(place, value, FREE)
+    guess = limits.pop("guess") if "guess" in limits else _own(flat, place, name)
+    return Free(guess, **limits)
 
 
 def _own(flat: FlatModel, place: str, name: str) -> Any:
@@ -216,9 +168,3 @@ def _own(flat: FlatModel, place: str, name: str) -> Any:
         numbers = [float(one) for one in chosen]
         return numbers[0] if len(numbers) == 1 else numbers
     raise ModelError(f"{place}: the model has no number for {name}, expected a guess: {{ guess = 1.0 }}")
-
-
-def _numeric(value: Any) -> bool:
-    if isinstance(value, list):
-        return bool(value) and all(_numeric(one) for one in value)
-    return isinstance(value, (int, float)) and not isinstance(value, bool)

@@ -1,16 +1,14 @@
 """Estimated values as modifications of the model, for `--set` of all commands."""
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gantrytau import parameter_text
 from gantrytau.commands.estimate.estimate_file import EstimateFile
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import Estimate
+from gantrytau_optimica import Estimate
 
 
-def set_values(asked: EstimateFile, found: "Estimate") -> dict[str, Any]:
+def set_values(asked: EstimateFile, found: Estimate) -> dict[str, Any]:
     """Name -> value of the parameters that are the same in all experiments; a vector is a list, a matrix its rows."""
     values: dict[str, Any] = {}
     for name in asked.parameters:
@@ -31,7 +29,7 @@ def _key(name: str) -> str:
     return name if re.fullmatch(r"[\w-]+", name, re.ASCII) else f'"{name}"'
 
 
-def own_names(asked: EstimateFile, found: "Estimate") -> list[str]:
+def own_names(asked: EstimateFile, found: Estimate) -> list[str]:
     """Numbers that belong to single experiments: their starts, and parameters of their own."""
     shared = {
         n for name in asked.parameters for p in asked.flat.parameters if name == p.name for n in p.elements
@@ -39,7 +37,7 @@ def own_names(asked: EstimateFile, found: "Estimate") -> list[str]:
     return [name for name in found.parameters if name not in shared and name not in asked.parameters]
 
 
-def values_text(asked: EstimateFile, found: "Estimate", values: dict[str, Any]) -> str:
+def values_text(asked: EstimateFile, found: Estimate, values: dict[str, Any]) -> str:
     """A file for `--set`, with deviations and what belongs to single experiments as comments."""
     chosen = asked.chosen
     whose = f"{chosen.name}({chosen.prototype})" if chosen.prototype else chosen.name

@@ -1,11 +1,8 @@
 """What `gantrytau fmu export` asks for, in groups: the file, its translation, its experiment, and about the model."""
 
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
-
-from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.printing.spelling import Spelling
 
 TRANSLATION, EXPERIMENT, ABOUT = "Translation", "Experiment", "About the model"  # headings of the help
 INTERFACES = {
@@ -13,31 +10,34 @@ INTERFACES = {
     "me": ("model-exchange",),
     "cs": ("co-simulation",),
 }
-VERSIONS = {"2.0": "2.0", "2": "2.0", "3.0": "3.0", "3": "3.0"}
-SPELLING = Spelling(
-    ("export_fmu", "translate"),
-    {name: f"--{name}" for name in ("platforms", "given", "find", "states", "tolerance", "solver", "fmi")},
-)
 
 
-def _text(name: str, words: str, default: str | bool = False) -> typer.models.OptionInfo:
+def _about(words: str, default: str | bool = False, *names: str) -> Any:
     """A text about the model."""
-    return typer.Option(f"--{name}", metavar="TEXT", help=words, show_default=default, rich_help_panel=ABOUT)
+    return typer.Option(*names, metavar="TEXT", help=words, show_default=default, rich_help_panel=ABOUT)
 
 
-def _names(name: str, words: str, default: str | bool = False) -> typer.models.OptionInfo:
+def _names(words: str, default: str | bool = False) -> Any:
     """Names of variables."""
-    return typer.Option(
-        f"--{name}", metavar="NAMES", help=words, show_default=default, rich_help_panel=TRANSLATION
-    )
+    return typer.Option(metavar="NAMES", help=words, show_default=default, rich_help_panel=TRANSLATION)
 
 
-Version = Annotated[
-    str,
-    typer.Option(
-        "--fmi", metavar="2.0|3.0", autocompletion=words("2.0", "3.0"), help="Version of the standard."
-    ),
-]
+def _time(words: str, default: str) -> Any:
+    return typer.Option(help=words, show_default=default, rich_help_panel=EXPERIMENT)
+
+
+OPTIONS = dict(
+    fmi="Version of the standard.",
+    solver=typer.Option(help="Of Co-Simulation; rodas4 for stiff models.", rich_help_panel=EXPERIMENT),
+    tolerance=typer.Option(help="Relative, of Co-Simulation.", rich_help_panel=EXPERIMENT),
+)
+BUILD = dict(
+    description=_about("What the file says of the model.", "the model's"),
+    author=_about("Who wrote the model."),
+    copyright=_about("Whose the model is."),
+    license=_about("Licence of the model, as BSD-3-Clause."),
+    version=_about("Version of the model.", False, "--model-version"),
+)
 Platforms = Annotated[
     list[str] | None,
     typer.Option(
@@ -48,49 +48,13 @@ Platforms = Annotated[
     ),
 ]
 Interface = Annotated[
-    str,
-    typer.Option(
-        metavar="me|cs|both",
-        autocompletion=words("me", "cs", "both"),
-        help="Model Exchange, Co-Simulation, or both.",
-    ),
+    Literal["me", "cs", "both"], typer.Option(help="Model Exchange, Co-Simulation, or both.")
 ]
 NoSources = Annotated[bool, typer.Option("--no-sources", help="Leave the C sources out of the file.")]
-
 Given = Annotated[
-    list[str] | None,
-    _names("given", "The inputs of the FMU, separated by commas, instead of the model's."),
+    list[str] | None, _names("The inputs of the FMU, separated by commas, instead of the model's.")
 ]
-Find = Annotated[list[str] | None, _names("find", "Its outputs, separated by commas.", "all variables")]
-States = Annotated[
-    list[str] | None, _names("states", "Preferred states, separated by commas.", "chosen by gantrytau")
-]
-
-SolverName = Annotated[
-    str,
-    typer.Option(
-        metavar="dopri5|rodas4",
-        autocompletion=words("dopri5", "rodas4"),
-        help="Of Co-Simulation; rodas4 for stiff models.",
-        rich_help_panel=EXPERIMENT,
-    ),
-]
-Tolerance = Annotated[float, typer.Option(help="Relative, of Co-Simulation.", rich_help_panel=EXPERIMENT)]
-Stop = Annotated[
-    float | None,
-    typer.Option(help="Default experiment: its end, in s.", show_default="1.0", rich_help_panel=EXPERIMENT),
-]
-Step = Annotated[
-    float | None,
-    typer.Option(
-        help="Default experiment: step of Co-Simulation, in s.",
-        show_default="0.004",
-        rich_help_panel=EXPERIMENT,
-    ),
-]
-
-Description = Annotated[str, _text("description", "What the file says of the model.", "the model's")]
-Author = Annotated[str, _text("author", "Who wrote the model.")]
-Copyright = Annotated[str, _text("copyright", "Whose the model is.")]
-License = Annotated[str, _text("license", "Licence of the model, as BSD-3-Clause.")]
-ModelVersion = Annotated[str, _text("model-version", "Version of the model.")]
+Find = Annotated[list[str] | None, _names("Its outputs, separated by commas.", "all variables")]
+States = Annotated[list[str] | None, _names("Preferred states, separated by commas.", "chosen by gantrytau")]
+Stop = Annotated[float | None, _time("Default experiment: its end, in s.", "1.0")]
+Step = Annotated[float | None, _time("Default experiment: step of Co-Simulation, in s.", "0.004")]

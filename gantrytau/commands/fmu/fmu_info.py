@@ -1,12 +1,13 @@
 """`gantrytau fmu info`: what an FMU is, without loading anything of it."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import CommandError, as_json, reporting
+from gantrytau_fmu import no_file, read_fmu, read_system
 
 FmuFile = Annotated[
     Path,
@@ -29,25 +30,10 @@ def info(
     """
     with reporting(json):
         present(file)
-        found = _read(file)
-        if json:
-            typer.echo(as_json(found.as_dict()))
-            return
+        found = (read_system if is_system(file) else read_fmu)(file)
         words = found.table(None) if every else str(found)
-        typer.echo(words)
-        if "\n  ... and " in words:
-            typer.echo("\n--all lists all of them")
-
-
-def _read(file: Path) -> Any:
-    """The description of an FMU, or of a system."""
-    if is_system(file):
-        from gantrytau_fmu import read_system
-
-        return read_system(file)
-    from gantrytau_fmu import read_fmu
-
-    return read_fmu(file)
+        more = "\n\n--all lists all of them" if "\n  ... and " in words else ""
+        typer.echo(as_json(found.as_dict()) if json else f"{words}{more}")
 
 
 def is_system(file: Path) -> bool:
@@ -57,8 +43,6 @@ def is_system(file: Path) -> bool:
 
 def present(file: Path) -> None:
     """CommandError if there is no such file."""
-    from gantrytau_fmu import no_file
-
     if not file.is_file():
         raise CommandError(no_file(file))
 

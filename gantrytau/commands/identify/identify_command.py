@@ -3,41 +3,31 @@
 import shlex
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from gantrytau.border import source_of
 from gantrytau.commands.arguments.model_choice import build
-from gantrytau.commands.arguments.options import Json, PrototypeName, Settings
-from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
-from gantrytau.commands.printing.spelling import Spelling
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import Finding, Identification, MotionLog
+from gantrytau.commands.arguments.option import serves
+from gantrytau.commands.arguments.options import Json, PrototypeName, RobotName, Settings
+from gantrytau.commands.printing.reporting import (
+    CommandError,
+    answered,
+    busy,
+    refusing,
+    reporting,
+    written,
+)
+from gantrytau_optimica import Finding, Identification, MotionLog, check_motion
+from gantrytau_optimica import identify as identified
 
 MANY = 100  # rows of a finding that are listed
-LAWS = ("symmetric", "asymmetric", "stribeck", "none")
-SPELLING = Spelling(
-    ("identify",),
-    {name: f"--{name}" for name in ("friction", "fixed", "cutoff")}
-    | {"robot": "--robot", "minimum_speed": "--minimum-speed"},
-)
 Logs = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILE...",
         help="Logs of motion, as log.csv with the header t,q1,...,f1,... in SI, or with units, as 'q1 (mm)'.",
-        show_default=False,
-    ),
-]
-RobotName = Annotated[
-    str,
-    typer.Option(
-        "--robot",
-        metavar="MODEL",
-        help="The robot with its nominal values, named as for the other commands: 'GantryTau(L1)', robot.py:Robot.",
         show_default=False,
     ),
 ]
@@ -55,27 +45,23 @@ Report = Annotated[
 ]
 
 
+@serves(
+    identified,
+    friction="The law of friction; none keeps the model's.",
+    cutoff=typer.Option(metavar="HZ", help="Of the filter of motion and forces."),
+    minimum_speed=typer.Option(
+        metavar="M/S", help="Below it a joint's rows do not count; rad/s of those that turn."
+    ),
+)
 def identify(
     files: Logs,
     robot: RobotName,
-    friction: Annotated[
-        str,
-        typer.Option(
-            metavar="|".join(LAWS),
-            autocompletion=words(*LAWS),
-            help="The law of friction; none keeps the model's.",
-        ),
-    ] = "symmetric",
     fixed: FixedValues = None,
-    cutoff: Annotated[float, typer.Option(metavar="HZ", help="Of the filter of motion and forces.")] = 10.0,
-    minimum_speed: Annotated[
-        float,
-        typer.Option(metavar="M/S", help="Below it a joint's rows do not count; rad/s of those that turn."),
-    ] = 0.005,
     report: Report = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
     json: Json = False,
+    **policy: Any,
 ) -> None:
     """Identify masses and friction of a robot from logs of its motion and forces.
 
@@ -83,37 +69,20 @@ def identify(
 
     The last line has the values as options of all commands: --set carts[0].m=13.1.
     """
-    with reporting(json, source_of(robot), SPELLING):
-        from gantrytau_optimica import MotionLog, check_motion
-        from gantrytau_optimica import identify as identified
-
-        if friction not in LAWS:
-            raise CommandError(
-                f"--friction {friction}: found an unknown law, expected one of {', '.join(LAWS)}"
-            )
+    with reporting(json, source_of(robot)):
         known = dict(_fixed(text) for text in fixed or ())
         chosen = build(robot, prototype, set_ or ())
         with refusing():
             logs = [MotionLog.read(file) for file in files]
-        with busy(f"identifying {type(chosen.model).__name__}"):
+        with busy(f"identifying {chosen.name}"):
             noticed = [
                 (file, f, len(log))
                 for file, log in zip(files, logs, strict=True)
                 for f in _once(log, check_motion(chosen.model, log))
             ]
-            law: Any = None if friction == "none" else friction
-            found = identified(
-                chosen.model, logs, fixed=known, friction=law, cutoff=cutoff, minimum_speed=minimum_speed
-            )
-        if report is not None:
-            with writable(report):
-                found.report(report)
+            found = identified(chosen.model, logs, fixed=known, **policy)
         record = summary(found, noticed)
-        typer.echo(
-            as_json({**record, "report": None if report is None else str(report)})
-            if json
-            else _told(found, record)
-        )
+        answered(json, {**record, "report": report}, _told(found, record), written(report, found.report))
 
 
 def _fixed(text: str) -> tuple[str, float]:
@@ -126,49 +95,44 @@ def _fixed(text: str) -> tuple[str, float]:
         ) from None
 
 
-def _once(log: "MotionLog", against: "tuple[Finding, ...]") -> "list[Finding]":
+def _once(log: MotionLog, against: tuple[Finding, ...]) -> list[Finding]:
     """Findings of a log, and of it beside the robot, one of each kind of the latter."""
     own = list(log.findings)
     return [*own, *(f for f in against if f.kind not in {one.kind for one in own})]
 
 
-def summary(found: "Identification", noticed: "list[tuple[Path, Finding, int]]") -> dict[str, Any]:
+def summary(found: Identification, noticed: list[tuple[Path, Finding, int]]) -> dict[str, Any]:
     """What was found as a record for programs; rows of findings count from 0, lines of files from 1."""
-    deviations = found.deviations
-    from gantrytau_optimica import MotionLog
-
     told: list[dict[str, Any]] = []
     for file, f, count in noticed:
         lines = MotionLog.lines(file, f.rows[:MANY]).tolist() if 0 < f.rows.size < count else []
-        told.append(
-            dict(file=str(file), kind=f.kind, message=f.message, rows=f.rows.tolist()[:MANY], lines=lines)
-        )
+        told.append(dict(file=file, kind=f.kind, message=f.message, rows=f.rows[:MANY], lines=lines))
     told += [
-        dict(file=None, kind=f.kind, message=f.message, rows=f.rows.tolist()[:MANY], lines=[])
+        dict(file=None, kind=f.kind, message=f.message, rows=f.rows[:MANY], lines=[])
         for f in found.findings
         if f.kind not in {one["kind"] for one in told}
     ]
     return {
         "robot": found.robot_name,
         "parameters": {
-            name: {"value": float(value), "deviation": float(deviations[name])}
+            name: {"value": float(value), "deviation": float(found.deviations[name])}
             for name, value in found.parameters.items()
         },
         "weak": list(found.weak),
         "active": list(found.active),
         "condition": float(found.condition),
-        "squares_N2": found.squares.tolist(),
+        "squares_N2": found.squares,
         "set": {name: float(value) for name, value in found.model_values.items()},
         "findings": told,
     }
 
 
-def _told(found: "Identification", record: dict[str, Any]) -> str:
+def _told(found: Identification, record: dict[str, Any]) -> str:
     """The same for readers."""
     lines = [str(replace(found, findings=()))]
     for finding in record["findings"]:
         first = f", line {finding['lines'][0]}" if finding["lines"] else ""
-        place = f"{Path(finding['file']).name}{first}: " if finding["file"] else ""
+        place = f"{finding['file'].name}{first}: " if finding["file"] else ""
         lines.append(f"  {place}{finding['kind']}: {finding['message']}")
     options = " ".join(f"--set {shlex.quote(f'{name}={value:.9g}')}" for name, value in record["set"].items())
     return "\n".join([*lines, f"As options: {options}"])

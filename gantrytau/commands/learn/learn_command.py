@@ -3,43 +3,31 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from gantrytau import GantryTauError
+from gantrytau.commands.arguments.option import printing, serves
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import (
-    INTERRUPTED,
-    CommandError,
-    as_json,
-    fail,
-    note,
-    refusing,
-    reporting,
-)
-from gantrytau.commands.printing.spelling import Spelling
-
-if TYPE_CHECKING:
-    from gantrytau_optimica import LearntCases
+from gantrytau.commands.printing.reporting import INTERRUPTED, answered, fail, note, refusing, reporting
+from gantrytau_optimica import RIG_EXAMPLE, LearntCases, learn_cases, plot_learning, read_rig
 
 PICTURES = ("errors", "input", "path")
-SPELLING = Spelling(
-    ("learn", "design_q", "estimated_response", "square_reference", "Tukey"),
-    {"iterations": "--iterations", "seed": "--seed", "history": "--output", "learning": "learning"}
-    | {"limit": "open_to", "window": "learning.window", "reference": "reference"},
-    exactly={"force=True runs it all the same": "--force runs it all the same"}
-    | {"start without history": "take another --output"},
-)
+NAMES = {"history": "--output", "learning": "learning", "limit": "open_to", "reference": "reference"} | {
+    "window": "learning.window"
+}
 
 
+@serves(learn_cases, force=typer.Option("--force", help="Learn what would diverge, too."))
 def learn(
     file: Annotated[
-        Path | None,
+        Path,
         typer.Argument(
             metavar="FILE", help="The rig, as rig.toml; --example prints one.", show_default=False
         ),
-    ] = None,
+    ],
+    force: bool,
     case: Annotated[
         list[str] | None,
         typer.Option("--case", metavar="NAME", help="Only this case; repeatable.", show_default=False),
@@ -57,24 +45,19 @@ def learn(
             show_default=False,
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Learn what would diverge, too.")] = False,
-    example: Annotated[bool, typer.Option("--example", help="Print a file to begin with.")] = False,
+    example: Annotated[
+        bool,
+        typer.Option(
+            "--example", help="Print a file to begin with.", is_eager=True, callback=printing(RIG_EXAMPLE)
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Learn a motion from run to run, and compare ways to learn it.
 
     What corrections do is measured first; what would diverge is refused before the first run.
     """
-    with reporting(json, None, SPELLING):
-        from gantrytau_optimica import RIG_EXAMPLE, learn_cases, read_rig
-
-        if example:
-            typer.echo(RIG_EXAMPLE, nl=False)
-            return
-        if file is None:
-            raise CommandError(
-                "found no FILE, expected a rig and ways to learn: gantrytau learn --example > rig.toml"
-            )
+    with reporting(json, None, NAMES):
         with refusing():
             rig = read_rig(file).changed(iterations=iterations, seed=seed, names=tuple(case or ()))
         if output is not None:
@@ -83,14 +66,8 @@ def learn(
         with _interrupts(output, json):
             found = learn_cases(rig, folder=output, force=force, progress=tell)
         files = [] if output is None else kept(found, output)
-        if json:
-            typer.echo(as_json({**summary(found), "files": [str(path) for path in files]}))
-            return
-        for name, history in found.histories.items():
-            typer.echo(f"Case {name}. {history}\n")
-        typer.echo(str(found))
-        for path in files:
-            typer.echo(f"Written: {path}")
+        cases = (f"Case {name}. {history}\n" for name, history in found.histories.items())
+        answered(json, {"cases": summary(found)}, "\n".join([*cases, str(found)]), files)
 
 
 @contextmanager
@@ -99,9 +76,7 @@ def _interrupts(folder: Path | None, json: bool) -> Iterator[None]:
     try:
         yield
     except (KeyboardInterrupt, GantryTauError) as error:
-        first: BaseException = (
-            error  # simulations and runs tell of Ctrl-C as errors of their own, with what they have
-        )
+        first: BaseException = error  # runs tell of Ctrl-C as errors of their own, with what they have
         while first.__cause__ is not None:
             first = first.__cause__
         if not isinstance(first, KeyboardInterrupt):
@@ -114,10 +89,8 @@ def _interrupts(folder: Path | None, json: bool) -> Iterator[None]:
         fail(f"Interrupted; {where}", INTERRUPTED, json)
 
 
-def kept(found: "LearntCases", folder: Path) -> list[Path]:
+def kept(found: LearntCases, folder: Path) -> list[Path]:
     """Corrections and pictures of all cases beside their histories, and the files."""
-    from gantrytau_optimica import plot_learning
-
     files = []
     for name, history in found.histories.items():
         files += [
@@ -131,17 +104,16 @@ def kept(found: "LearntCases", folder: Path) -> list[Path]:
     return [*files, folder / "cases.png"]
 
 
-def summary(found: "LearntCases") -> dict[str, Any]:
+def summary(found: LearntCases) -> list[dict[str, Any]]:
     """What was learnt as a record for programs: errors in % of the first run, run by run."""
-    cases = [
+    return [
         {
             "name": name,
             "learns": list(history.names),
             "sigma": None if history.stability is None else history.stability.sigma,
-            "relative": history.relative.tolist(),
-            "tool": history.tool_relative[:, list(history.reference.moving)].tolist(),
-            "settled": found.settled(name)[list(history.reference.moving)].tolist(),
+            "relative": history.relative,
+            "tool": history.tool_relative[:, list(history.reference.moving)],
+            "settled": found.settled(name)[list(history.reference.moving)],
         }
         for name, history in found.histories.items()
     ]
-    return {"cases": cases}

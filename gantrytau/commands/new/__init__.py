@@ -1,15 +1,6 @@
-"""`gantrytau new`: something of your own to begin with."""
+"""`gantrytau new`: a project of your own to begin with."""
 
-import typer
+from gantrytau.commands.printing.command_group import group
 
-from gantrytau.commands.new.new_robot import robot
-
-app = typer.Typer(help="Write a project of your own to begin with.", no_args_is_help=True)
-
-
-@app.callback()
-def options() -> None:
-    """Write a project of your own to begin with."""
-
-
-app.command(epilog="Example: gantrytau new robot my_robot && cd my_robot && python -m pytest")(robot)
+PLACES = {"robot": ("new.new_robot", "gantrytau new robot my_robot && cd my_robot && python -m pytest")}
+app = group("Write a project of your own to begin with.", PLACES)

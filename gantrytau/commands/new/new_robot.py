@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import CommandError, as_json, reporting, write_text
+from gantrytau.commands.printing.reporting import CommandError, answered, reporting, write_text
 
 TEMPLATES = "five_bar"  # folder of this package with the files of the project
 NAME = "MY_ROBOT"  # stands for the name of the project
@@ -37,11 +37,8 @@ def robot(
             target = folder / template.name.removesuffix(".txt")
             write_text(template.read_text(encoding="utf-8").replace(NAME, name), target)
             written.append(target)
-        if json:
-            typer.echo(as_json({"folder": str(folder), "files": [str(file) for file in written]}))
-            return
-        typer.echo(f"Written: {', '.join(str(file) for file in written)}")
-        typer.echo(f"Next: cd {folder} && gantrytau check robot.py:FiveBar; README.md has more commands")
+        next_ = f"Next: cd {folder} && gantrytau check robot.py:FiveBar; README.md has more commands"
+        answered(json, {"folder": folder}, next_, written)
 
 
 def _make(folder: Path) -> None:

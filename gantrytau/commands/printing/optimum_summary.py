@@ -1,24 +1,23 @@
 """What `gantrytau optimize` prints of an optimum."""
 
 import platform
+from dataclasses import asdict
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from gantrytau import in_unit
+from gantrytau import FlatModel, in_unit
 from gantrytau.commands.arguments.model_choice import Chosen
 
 if TYPE_CHECKING:
-    from gantrytau import FlatModel
     from gantrytau_optimica import Optimum
 
 
-def summary(chosen: Chosen, optimum: "Optimum", files: list[str]) -> dict[str, Any]:
+def summary(chosen: Chosen, optimum: "Optimum") -> dict[str, Any]:
     """The optimum as a record for programs; times of the work in s."""
     return {
-        "problem": chosen.name,
-        "prototype": chosen.prototype,
+        **chosen.record("problem"),
         "success": optimum.success,
         "status": optimum.status,
         "objective": optimum.objective,
@@ -33,14 +32,11 @@ def summary(chosen: Chosen, optimum: "Optimum", files: list[str]) -> dict[str, A
             "python": platform.python_version(),
         },
         "report": optimum.report().splitlines(),
-        "files": files,
     }
 
 
 def _refinement(optimum: "Optimum") -> dict[str, Any] | None:
     """Whether the accuracy asked for was reached, and the rounds; None where none was asked for."""
-    from dataclasses import asdict
-
     found = optimum.refinement
     if found is None:
         return None
@@ -48,8 +44,8 @@ def _refinement(optimum: "Optimum") -> dict[str, Any] | None:
     return {**named, "rounds": [asdict(one) for one in found.rounds], "kept": found.kept}
 
 
-def show(optimum: "Optimum", flat: "FlatModel", files: list[str]) -> None:
-    """The report, the free numbers with their units, and the files."""
+def show(optimum: "Optimum", flat: FlatModel) -> None:
+    """The report, and the free numbers with their units."""
     typer.echo(optimum.report())
     if optimum.free:
         typer.echo("Free numbers:")
@@ -63,5 +59,3 @@ def show(optimum: "Optimum", flat: "FlatModel", files: list[str]) -> None:
         words = f" ({quantity.description})" if quantity and quantity.description else ""
         typer.echo(f"  {name} = {value:.8g} {unit}".rstrip() + words)
     typer.echo(f"Built in {optimum.build_time:.2f} s, solved in {optimum.solve_time:.2f} s")
-    for file in files:
-        typer.echo(f"Written: {file}")

@@ -1,13 +1,14 @@
 """Drawing a result on the command line: to a file, or in a window where there is a display."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gantrytau import Result, Study, has_windows
 from gantrytau.commands.printing.reporting import CommandError, refusing, writable
 
 if TYPE_CHECKING:
-    from gantrytau import Result, Study
     from gantrytau_optimica import Optimum
 
 WINDOW = "window"
@@ -25,14 +26,15 @@ def place(drawn: tuple[str, ...], to: str | None) -> str | None:
     return to or WINDOW
 
 
-def rehearse(to: str, option: str = "--to") -> None:
-    """CommandError if there is no window to draw in, or no picture of that format or in that folder."""
+def rehearse(to: str | None, option: str = "--to") -> None:
+    """CommandError if there is no window to draw in, or no picture of that format or in that folder; None is none."""
     import matplotlib
+
+    if to is None:
+        return
 
     if to == WINDOW:
         import matplotlib.pyplot as plt
-
-        from gantrytau import has_windows
 
         if not has_windows(plt.get_backend()):
             raise CommandError(
@@ -58,17 +60,19 @@ def draw(
     result: "Result | Optimum | Study", names: tuple[str, ...], to: str, display: Any = None
 ) -> list[str]:
     """Draw the variables, in units as `display` says; the files written."""
-    return shown(lambda file: result.plot(*names, file=file, display=display), to)
+    return shown(partial(result.plot, *names, display=display), to)
 
 
-def shown(plot: Callable[[str | None], Any], to: str, option: str = "--plot") -> list[str]:
-    """Draw by a function of the file, which is None for a window; the files written."""
+def shown(plot: Callable[..., Any], to: str | None, option: str = "--plot") -> list[str]:
+    """Draw by a function of `file=`, which is None for a window; the files written, none where nothing is drawn."""
+    if to is None:
+        return []
     if to != WINDOW:
         with writable(Path(to)), refusing(f"{option} "):
-            plot(to)
+            plot(file=to)
         return [to]
     import matplotlib.pyplot as plt
 
-    plot(None)
+    plot(file=None)
     plt.show()
     return []

@@ -1,118 +1,48 @@
 """How commands speak: results and errors as sentences or as JSON, exit codes, lines of the user's own file."""
 
-import errno
 import math
-import os
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
-from typer.core import TyperGroup
 
-from gantrytau import GantryTauError, heeding_interrupts
+from gantrytau import GantryTauError
 from gantrytau.border import NotLoaded, python_error, user_lines
-from gantrytau.commands.printing.help_pages import tidy
-from gantrytau.commands.printing.spelling import Spelling
+from gantrytau.commands.printing.spelling import RUNNING, spelled
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
 INTERRUPTED = 130  # exit code of a program stopped by Ctrl-C
-
-USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
-
-
-_PLAINLY = {
-    "Input should be a valid number, unable to parse string as a number": "expected a number, as 0.5",
-    "Input should be a valid integer, unable to parse string as an integer": "expected a whole number",
-    "Input should be a valid integer, got a number with a fractional part": "expected a whole number",
-    "Input should be greater than or equal to": "expected at least",
-    "Input should be less than or equal to": "expected at most",
-}
-PLAIN = Spelling((), {})
 
 
 class CommandError(GantryTauError):
     """The command was called with something that it cannot use."""
 
 
-class Commands(TyperGroup):
-    """All commands; an output that takes no more, as a full disk, ends them with a message instead of a traceback.
-
-    Arguments and options that do not exist or are missing are told as JSON where `--json` is among them.
-    """
-
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """A command by its name, with a help page for readers."""
-        command = super().get_command(ctx, cmd_name)
-        if command is not None:
-            tidy(command)
-            for below in getattr(command, "commands", {}).values():
-                tidy(below)
-        return command
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        """The page of all commands."""
-        tidy(self)
-        super().format_help(ctx, formatter)
-
-    def invoke(self, ctx: Any) -> Any:
-        """Run a command, and see to it that all it printed has arrived."""
-        json = "--json" in [*getattr(ctx, "_protected_args", ()), *ctx.args]
-        try:
-            try:
-                with heeding_interrupts():
-                    return super().invoke(ctx)
-            finally:
-                if sys.stdout is not None:  # it may be closed
-                    sys.stdout.flush()
-        except USAGE_ERROR as error:
-            error.message = in_plain_words(error.message)
-            if not json:
-                raise
-            fail(error.format_message(), MISUSE, json)
-        except OSError as error:
-            if error.filename is not None or error.errno not in FULL:
-                raise
-            _drop_output()
-            note(f"Cannot write: {error.strerror}; make room, or send the output to another place")
-            raise typer.Exit(MISUSE) from None
-
-
-def in_plain_words(message: str) -> str:
-    """What Typer says of a value that is none, without the parsing of strings."""
-    for said, here in _PLAINLY.items():
-        message = message.replace(said, here)
-    return message
-
-
-def _drop_output() -> None:
-    """Let what is left in the buffer of stdout vanish; Python would complain of it at its end."""
-    with suppress(OSError, ValueError, AttributeError):  # stdout need not be a file
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 @contextmanager
-def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN) -> Iterator[None]:
+def reporting(
+    json: bool, source: Path | None = None, names: Mapping[str, str] | None = None
+) -> Iterator[None]:
     """Errors inside become a message and an exit code instead of a traceback.
 
-    json: print `{"error": ...}`; source: the user's file, of which the lines that failed are shown; spelling: how
-    arguments are written here, of which one that is wrong means that the command was called wrongly.
-    An error that comes neither from the toolkit nor from `source` is a bug of the toolkit and passes.
+    json: print `{"error": ...}`; source: the user's file, of which the lines that failed are shown; names: options, or
+    keys of a file, of arguments that have another name here. An argument that is wrong means that the command was called
+    wrongly. An error that comes neither from the toolkit nor from `source` is a bug of the toolkit and passes.
     """
+    spelling = RUNNING.get().with_names(names or {})
+    token = RUNNING.set(spelling)
     try:
         yield
     except (CommandError, NotLoaded) as error:
-        told = isinstance(error.__cause__, GantryTauError)  # in the words of the library
-        fail(spelling.words(str(error)) if told else str(error), MISUSE, json)
+        fail(str(error), MISUSE, json)
     except GantryTauError as error:
         place = "".join(f"\n  {line}" for line in user_lines(error, source)[-1:])
         code = MISUSE if error.argument in spelling.options else FAULT
-        fail(f"{spelling.of(error)}{place}", code, json, kind=type(error).__name__)
+        fail(f"{spelled(error)}{place}", code, json, kind=type(error).__name__)
     except KeyboardInterrupt:
         fail("Interrupted; nothing was written", INTERRUPTED, json)
     except (SystemExit, typer.Exit):
@@ -122,6 +52,8 @@ def reporting(json: bool, source: Path | None = None, spelling: Spelling = PLAIN
         if not lines:
             raise
         fail(python_error(error, lines), FAULT, json, kind=type(error).__name__)
+    finally:
+        RUNNING.reset(token)
 
 
 @contextmanager
@@ -132,7 +64,7 @@ def refusing(beginning: str = "") -> Iterator[None]:
     except (CommandError, NotLoaded):
         raise
     except GantryTauError as error:
-        raise CommandError(f"{beginning}{error}") from error
+        raise CommandError(f"{beginning}{spelled(error)}") from error
 
 
 def fail(message: str, code: int, json: bool, **more: Any) -> NoReturn:
@@ -149,21 +81,55 @@ def note(message: str) -> None:
     typer.echo(message, err=True)
 
 
+def answered(
+    json: bool, record: Mapping[str, Any], report: str | Callable[[], None] | None, files: Iterable[Any] = ()
+) -> None:
+    """The end of a command: the record with its files as JSON, or the report, as a text or printed, and the files."""
+    written = [str(file) for file in files if file is not None]
+    if json:
+        typer.echo(as_json({**record, "files": written}))
+        return
+    if isinstance(report, str):
+        typer.echo(report)
+    elif report is not None:
+        report()
+    for file in written:
+        typer.echo(f"Written: {file}")
+
+
 def as_json(value: Any) -> str:
-    """JSON text; numbers that are not finite become null, which JSON can say."""
+    """JSON text; numbers that are not finite become null, which JSON can say, arrays lists, and paths texts."""
     import json
 
-    return json.dumps(_finite(value), indent=2, allow_nan=False)
+    return json.dumps(_plain(value), indent=2, allow_nan=False)
 
 
-def _finite(value: Any) -> Any:
+def _plain(value: Any) -> Any:
+    if hasattr(value, "tolist"):  # of NumPy
+        value = value.tolist()
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
-    return value
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> None:
+    """A table on the terminal; texts are no markup. right: columns of numbers, by default all but the first."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE, pad_edge=False)
+    for k, heading in enumerate(headings):
+        numbers = k in right if right else k > 0
+        table.add_column(heading, justify="right" if numbers else "left", no_wrap=numbers, overflow="fold")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)
 
 
 @contextmanager
@@ -209,15 +175,24 @@ def writable(file: Path) -> Iterator[None]:
         raise CommandError(f"Cannot write {file}: {error.strerror}; name another place") from error
 
 
+def written(file: Path | None, write: Callable[[Path], Any]) -> list[Path]:
+    """Write a file, if one is named; the files written."""
+    if file is None:
+        return []
+    with writable(file):
+        write(file)
+    return [file]
+
+
 @contextmanager
-def noted(kind: type[Warning], told: list[str], json: bool, spelling: Spelling = PLAIN) -> Iterator[None]:
+def noted(kind: type[Warning], told: list[str], json: bool) -> Iterator[None]:
     """While it lasts, warnings of a kind become lines of `told`, printed at once, or with the JSON."""
 
     def hear(message: Warning | str, category: type[Warning], *where: Any, **more: Any) -> None:
         if not issubclass(category, kind):
             show(message, category, *where, **more)
             return
-        told.append(spelling.words(str(message)))
+        told.append(str(message))
         if not json:
             note(f"Note: {told[-1]}")
 

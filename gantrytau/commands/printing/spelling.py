@@ -1,55 +1,90 @@
-"""How arguments of functions are written on the command line: `loss='robust'` as `--robust`."""
+"""Errors of functions in the words of a command: options in place of arguments, and no name of the function."""
 
 import re
+import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from gantrytau import GantryTauError
+from gantrytau import GantryTauError, Model
+from gantrytau.border import Given, short
+
+DOORS = (
+    "",
+    "_fmu",
+    "_fmu.controller",
+    "_optimica",
+    "_optimica.vision",
+)  # of gantrytau: packages with functions
 
 
 @dataclass(frozen=True)
 class Spelling:
-    """The options of a command, or the places of a file, that stand for arguments of a function.
+    """How arguments of functions are written: as options of the command that runs, or as keys of a file.
 
-    functions: whose messages are said without their names; options: by argument; flags: arguments whose options take no
-    value; exactly: what is not put together from argument and value, as it stands in Python -> as it is said here.
+    options: by argument; flags: those that take no value.
     """
 
-    functions: tuple[str, ...]
-    options: Mapping[str, str]
-    flags: tuple[str, ...] = ()
-    exactly: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict)
+    flags: frozenset[str] = frozenset()
 
-    def of(self, error: GantryTauError) -> str:
-        """The message of an error, which names the option where an argument is wrong that has one."""
-        text = str(error)
-        for function in self.functions:
-            text = text.removeprefix(f"{function}: ").removeprefix(f"{function}.")
-        option = self.options.get(error.argument or "")
-        if option and re.match(rf"{error.argument}(?![\w=])", text):
-            text = option + text.removeprefix(str(error.argument))
-        if option and text.startswith(f"found {error.argument}="):
-            text = text.removeprefix("found ").replace(", expected", ": expected", 1)
-        text = self.words(text)
+    @classmethod
+    def of(cls, command: Any) -> "Spelling":
+        """The options of a command, whose parameters have the names of the function's arguments."""
+        options = {p.name: (max(p.opts, key=len), p) for p in command.params if p.param_type_name == "option"}
+        flags = frozenset(option for option, p in options.values() if p.is_flag)
+        return cls({name: option for name, (option, _) in options.items()}, flags)
+
+    def with_names(self, names: Mapping[str, str]) -> "Spelling":
+        """With arguments that have options of other names, or places in a file."""
+        return replace(self, options={**self.options, **names})
+
+    def write(self, given: Given) -> str:
+        """An argument with its value as an option, `--method ipopt`, or as a key of a file, `goal.error = 5`."""
+        option = self.options.get(given.name)
+        if option is None or given.value is ... or option in self.flags:
+            return option or str(given)
+        return f"{option} {shell(given.value)}" if option[0] == "-" else f"{option} = {short(given.value)}"
+
+    def part(self, part: object) -> str:
+        """A part of a sentence."""
+        return self.write(part) if isinstance(part, Given) else str(part)
+
+    def message(self, error: GantryTauError) -> str:
+        """An error, without its place where that is the function which found it."""
+        words, option = error.words(self.write), self.options.get(error.argument or "")
+        if option and error.found:
+            return f"{self.write(error.found)}: {words}"
+        places = [place for place in error.place.split(": ") if place and not is_function(place)]
+        places = [place for place in places if not (option and place == error.argument)]
+        found = [f"found {error.found}, {words}"] if error.found else [words]
+        text = ": ".join([*places, *found])
         return text if option is None or option in text else f"{option}: {text}"
 
-    def words(self, message: str) -> str:
-        """A message with options in place of arguments, which Python writes as `name=value` or `name=`."""
-        for python, here in self.exactly.items():
-            message = message.replace(python, here)
-        names = "|".join(self.options)
-        keyword = (
-            rf"\b({names})=(?!=)('[^']*'|\[[^\]]*\]|{{'[^']*': [^}}]*}}|[\w.+-]*\w)?" if names else r"(?!)"
-        )
-        return re.sub(keyword, self._option, message).strip()
 
-    def _option(self, found: re.Match[str]) -> str:
-        option, value = self.options[found[1]], found[2]
-        if value is None or found[1] in self.flags:
-            return option
-        pair = re.fullmatch(r"{'([^']*)': ([^}]*)}", value)  # of a dictionary
-        if pair:
-            return f"{option} {pair[1]}={pair[2]}"
-        plain = value.strip("'")
-        word = re.fullmatch(r"[\w.+-]+", plain)  # a shell needs quotes for the rest
-        return f"{option} {plain if word else value}"
+NEUTRAL = Spelling()
+RUNNING: ContextVar[Spelling] = ContextVar("RUNNING", default=NEUTRAL)  # of the command that runs
+
+
+def spelled(error: GantryTauError) -> str:
+    """An error in the words of the command that runs."""
+    return RUNNING.get().message(error)
+
+
+def shell(value: Any) -> str:
+    """A value as it stands behind an option."""
+    if isinstance(value, Mapping):
+        return ",".join(f"{name}={shell(one)}" for name, one in value.items())
+    if isinstance(value, (list, tuple)):
+        return ",".join(map(shell, value))
+    if value is None or isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) and re.fullmatch(r"[\w.,:/+-]+", value) else short(value)
+
+
+def is_function(place: str) -> bool:
+    """Whether a place is the name of a function, or of a class of settings, that the packages offer."""
+    packages = (sys.modules.get(f"gantrytau{door}") for door in DOORS)
+    found = next((getattr(package, place) for package in packages if hasattr(package, place)), None)
+    return callable(found) and not (isinstance(found, type) and issubclass(found, Model))

@@ -7,7 +7,10 @@ import numpy as np
 import typer
 
 from gantrytau.commands.printing.reporting import CommandError, busy, note, reporting
-from gantrytau.commands.vision.vision_options import SPELLING
+from gantrytau.kinematics import Kinematics
+from gantrytau_models import SixLinkGantryTau, prototypes
+from gantrytau_optimica import Measurements
+from gantrytau_optimica.vision import Camera, Light, Pattern, Scene, render
 
 SIDE = 0.06  # m, of a cell
 PLACE = "0.15,0,0"  # of the pattern on the plate
@@ -27,12 +30,7 @@ def example(
     seed: Annotated[int, typer.Option(help="Of noise and light.")] = 0,
 ) -> None:
     """Write images of a Gantry-Tau by two cameras, what is guessed of their lenses, the carts, and places by a laser."""
-    with reporting(False, None, SPELLING):
-        from gantrytau.kinematics import Kinematics
-        from gantrytau_models import SixLinkGantryTau, prototypes
-        from gantrytau_optimica import Measurements
-        from gantrytau_optimica.vision import Camera, Light, Pattern, Scene, render
-
+    with reporting(False):
         if folder.exists() and any(folder.iterdir()):
             raise CommandError(f"{folder}: found a folder that is not empty, expected a new one")
         if each < 2:

@@ -6,17 +6,26 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.arguments.shell_offers import words
-from gantrytau.commands.printing.reporting import CommandError, as_json, busy, refusing, reporting, writable
+from gantrytau.commands.printing.reporting import (
+    CommandError,
+    answered,
+    busy,
+    refusing,
+    reporting,
+    written,
+)
 from gantrytau.commands.vision.vision_detect import Report
-from gantrytau.commands.vision.vision_options import SPELLING
+from gantrytau_optimica.vision import Camera, Detections, read_carts, write_vision_page
+from gantrytau_optimica.vision import reconstruct as reconstructed
 
-SCALES = ("spacing", "pattern", "both")
+NAMES = {"spacing": "--carts"}
 
 
+@serves(reconstructed, scale=typer.Option(help="What tells lengths.", show_default="what there is"))
 def reconstruct(
-    corners: Annotated[
+    corners_file: Annotated[
         Path, typer.Argument(metavar="FILE", help="Corners by `gantrytau vision detect`.", show_default=False)
     ],
     camera: Annotated[
@@ -28,6 +37,7 @@ def reconstruct(
             show_default=False,
         ),
     ],
+    scale: Any,
     carts: Annotated[
         Path | None,
         typer.Option(
@@ -36,18 +46,11 @@ def reconstruct(
             show_default=False,
         ),
     ] = None,
-    estimate: Annotated[bool, typer.Option("--estimate", help="Fit the lenses, too.")] = False,
-    scale: Annotated[
-        str | None,
-        typer.Option(
-            metavar="|".join(SCALES),
-            autocompletion=words(*SCALES),
-            help="What tells lengths.",
-            show_default="what there is",
-        ),
-    ] = None,
-    turning: Annotated[bool, typer.Option("--turning", help="The plate turns from pose to pose.")] = False,
-    free: Annotated[
+    intrinsics: Annotated[bool, typer.Option("--estimate", help="Fit the lenses, too.")] = False,
+    orientation: Annotated[
+        bool, typer.Option("--turning", help="The plate turns from pose to pose.")
+    ] = False,
+    corners: Annotated[
         bool, typer.Option("--free", help="Take each corner for itself, as the thesis does.")
     ] = False,
     place: Annotated[
@@ -71,65 +74,38 @@ def reconstruct(
     json: Json = False,
 ) -> None:
     """Find poses of the pattern and where the cameras stand, with the error that is to be expected."""
-    with reporting(json, None, SPELLING):
-        from gantrytau_optimica import Measurements
-        from gantrytau_optimica.vision import Camera, Detections, read_carts, write_vision_page
-        from gantrytau_optimica.vision import reconstruct as reconstructed
-
-        if scale is not None and scale not in SCALES:
-            raise CommandError(
-                f"--scale {scale}: found an unknown scale, expected one of {', '.join(SCALES)}"
-            )
+    with reporting(json, None, NAMES):
         middle = _place(place)
         with refusing():
-            found = Detections.read(corners)
+            found = Detections.read(corners_file)
             lenses = [Camera.read(file) for file in camera]
             q = None if carts is None else read_carts(carts, found.numbers)
-        tells: Any = scale
         with busy("adjusting cameras and poses"):
             poses = reconstructed(
                 found,
                 lenses,
-                intrinsics="estimate" if estimate else "fixed",
-                scale=tells,
+                intrinsics="estimate" if intrinsics else "fixed",
+                scale=scale,
                 spacing=None if scale == "pattern" else q,
-                orientation="free" if turning else "fixed",
-                corners="free" if free else "plate",
+                orientation="free" if orientation else "fixed",
+                corners="free" if corners else "plate",
             )
-        if output is not None:
-            empty = np.zeros((len(poses.r), 0)) if q is None else q
-            measured: Measurements = poses.measurements(empty, place=middle)
-            with writable(output):
-                measured.write(output)
-        if report is not None:
-            with writable(report):
-                write_vision_page(report, found, [str(folder) for folder in images or ()], poses)
-        if json:
-            record = {
-                "poses": int(poses.found.sum()),
-                "rms_pixel": poses.rms,
-                "expected_m": poses.expected,
-                "scale": poses.scale,
-                "cameras": [
-                    {
-                        "focal": each.focal.tolist(),
-                        "centre": each.centre.tolist(),
-                        "distortion": each.distortion.tolist(),
-                        "r": each.r.tolist(),
-                        "R": each.R.tolist(),
-                    }
-                    for each in poses.cameras
-                ],
-                "findings": [{"kind": f.kind, "message": f.message} for f in poses.findings],
-                "output": None if output is None else str(output),
-                "report": None if report is None else str(report),
-            }
-            typer.echo(as_json(record))
-            return
-        typer.echo(str(poses))
-        for path in (output, report):
-            if path is not None:
-                typer.echo(f"Written: {path}")
+        empty = np.zeros((len(poses.r), 0)) if q is None else q
+        files = written(output, lambda file: poses.measurements(empty, place=middle).write(file))
+        folders = [str(folder) for folder in images or ()]
+        files += written(report, lambda file: write_vision_page(file, found, folders, poses))
+        cameras = ("focal", "centre", "distortion", "r", "R")
+        record = {
+            "poses": int(poses.found.sum()),
+            "rms_pixel": poses.rms,
+            "expected_m": poses.expected,
+            "scale": poses.scale,
+            "cameras": [{name: getattr(one, name) for name in cameras} for one in poses.cameras],
+            "findings": [{"kind": f.kind, "message": f.message} for f in poses.findings],
+            "output": output,
+            "report": report,
+        }
+        answered(json, record, str(poses), files)
 
 
 def _place(text: str) -> list[float]:

@@ -6,11 +6,18 @@ from typing import Annotated
 import typer
 
 from gantrytau.commands.arguments.model_choice import build
+from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json
-from gantrytau.commands.printing.reporting import FAULT, as_json, note, refusing, reporting
-from gantrytau.commands.vision.vision_options import SPELLING
+from gantrytau.commands.printing.reporting import FAULT, answered, note, refusing, reporting
+from gantrytau_optimica import load_planned_cell
+from gantrytau_optimica.vision import Light, rehearse_plan
 
 
+@serves(
+    rehearse_plan,
+    side=typer.Option(metavar="M", help="Of a cell of the pattern on the tool."),
+    seed="Of the robot that stands there, and of noise and light.",
+)
 def rehearse(
     plan: Annotated[
         Path,
@@ -18,20 +25,17 @@ def rehearse(
             metavar="FOLDER", help="A plan by `gantrytau calibrate cell.toml`.", show_default=False
         ),
     ],
-    side: Annotated[float, typer.Option(metavar="M", help="Of a cell of the pattern on the tool.")] = 0.06,
+    side: float,
+    seed: int,
     gain: Annotated[float, typer.Option(help="Of the light; 0.15 is dim.")] = 1.0,
     believe: Annotated[
         bool,
         typer.Option("--believe", help="Take lenses as they are believed to be, instead of fitting them."),
     ] = False,
-    seed: Annotated[int, typer.Option(help="Of the robot that stands there, and of noise and light.")] = 0,
     json: Json = False,
 ) -> None:
     """Carry out a plan whose device is cameras with a simulated robot: images, corners, poses, calibration, verdict."""
-    with reporting(json, None, SPELLING):
-        from gantrytau_optimica import load_planned_cell
-        from gantrytau_optimica.vision import Light, rehearse_plan
-
+    with reporting(json):
         with refusing():
             planned = load_planned_cell(plan, lambda name: build(name).model)
             light = Light(gain)
@@ -43,20 +47,14 @@ def rehearse(
             seed=seed,
             progress=None if json else lambda words: note(f"{words} ..."),
         )
-        if json:
-            record = {
-                "pairs": int(found.detections.pairs.sum()),
-                "poses": len(found.detections.numbers),
-                "measured_m": found.measured.mean,
-                "tool_m": found.tool.mean,
-                "good": found.verdict.good,
-                "verdict": str(found.verdict),
-                "files": [str(path) for path in found.files],
-            }
-            typer.echo(as_json(record))
-        else:
-            typer.echo(str(found))
-            for path in found.files:
-                typer.echo(f"Written: {path}")
+        record = {
+            "pairs": int(found.detections.pairs.sum()),
+            "poses": len(found.detections.numbers),
+            "measured_m": found.measured.mean,
+            "tool_m": found.tool.mean,
+            "good": found.verdict.good,
+            "verdict": str(found.verdict),
+        }
+        answered(json, record, str(found), found.files)
         if not found.verdict.good:
             raise typer.Exit(FAULT)

@@ -159,10 +159,10 @@ def _without_cancelled(parts: ca.SX, factors: np.ndarray, points: Sequence[Mappi
     """The combination of parts, without the symbols on which it does not depend."""
     leaves = ca.symvar(parts)
     x, total = ca.vertcat(*leaves), ca.dot(ca.DM(factors), parts)
-    look = ca.Function("slopes", [x], [ca.densify(ca.jacobian(parts, x))])
+    look = ca.Function("jacobian", [x], [ca.densify(ca.jacobian(parts, x))])
     cancelled = np.ones(len(leaves), dtype=bool)
     for point in points:
-        slopes = np.array(look([point[leaf.name()] for leaf in leaves]))
-        cancelled &= np.abs(factors @ slopes) <= NOISE * (np.abs(factors) @ np.abs(slopes))
+        jacobian = np.array(look([point[leaf.name()] for leaf in leaves]))
+        cancelled &= np.abs(factors @ jacobian) <= NOISE * (np.abs(factors) @ np.abs(jacobian))
     gone = [leaf for leaf, zero in zip(leaves, cancelled, strict=True) if zero]
     return ca.substitute(total, ca.vertcat(*gone), ca.SX.zeros(len(gone))) if gone else total

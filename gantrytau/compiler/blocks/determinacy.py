@@ -12,7 +12,7 @@ from gantrytau.border.refusal import StructureError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.blocks.solution import Block
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.compiler.refusals import undetermined, without_inertia
+from gantrytau.compiler.refusals import undetermined
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.symbol_spaces import values_at
@@ -99,5 +99,10 @@ def massless(indexed: Indexed, reduced: Reduced, flat: FlatModel) -> StructureEr
         names = [leaf.name() for leaf in ca.symvar(residual)]
         slow = [n for n in names if indexed.orders.get(n) == 1 and n in flat.hints]
         if slow and any(n in roots for n in names):
-            return without_inertia(flat, slow, indexed.names[i])
+            words = ", ".join(f"{n} ({flat.hints[n]})" for n in slow[:4])
+            return StructureError(
+                f"{flat.name}: {words} would have to follow from a balance of forces, {indexed.names[i]}, because this "
+                "motion has neither mass nor inertia. Expected a mass or an inertia for every motion: put a Body there, or "
+                "hold the motion"
+            )
     return None

@@ -69,6 +69,6 @@ def _reaches_alike(middle: ca.SX, radicand: ca.SX, guide: Guide) -> bool:
     leaves = ca.symvar(middle)
     if not leaves:
         return False
-    slopes = guide.around(ca.jacobian(ca.vertcat(middle, radicand), ca.vertcat(*leaves)))
-    both = np.linalg.norm(slopes, axis=2).prod(axis=1)
-    return bool(np.all(np.abs((slopes[:, 0] * slopes[:, 1]).sum(axis=1)) <= ACROSS * both))
+    gradients = guide.around(ca.jacobian(ca.vertcat(middle, radicand), ca.vertcat(*leaves)))
+    both = np.linalg.norm(gradients, axis=2).prod(axis=1)
+    return bool(np.all(np.abs((gradients[:, 0] * gradients[:, 1]).sum(axis=1)) <= ACROSS * both))

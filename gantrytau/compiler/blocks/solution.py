@@ -192,23 +192,10 @@ def _finish(
     equations, unknowns, tears, residuals, inner, guide, scales: Scales | None, switching: bool
 ) -> Block:
     """Closed form for what is left after tearing, if there is one."""
+    parts = dict(equations=equations, unknowns=unknowns, tears=tears, residuals=residuals, inner=inner)
 
-    def block(kind: str, solution=None, root=None, held=None, margins=()) -> Block:
-        return Block(
-            kind,
-            equations,
-            unknowns,
-            tears,
-            residuals,
-            inner,
-            solution,
-            root,
-            held,
-            (),
-            margins,
-            (),
-            scales,
-        )
+    def block(kind: str, solution=None, **facts: Any) -> Block:
+        return Block(kind, solution=solution, scales=scales, **parts, **facts)
 
     if not tears:
         return block("explicit", ())
@@ -232,7 +219,7 @@ def _finish(
     curvature = ca.jacobian(ca.vec(ca.densify(jacobian)), y)
     if len(tears) == 1 and not ca.depends_on(curvature, y):
         root = quadratic_root(f, tears[0], guide)
-        return block("quadratic", (root.closed,), root)
+        return block("quadratic", (root.closed,), root=root)
     found = intersection(f, y, guide)
     return block("nonlinear") if found is None else block("spheres", tuple(found))
 

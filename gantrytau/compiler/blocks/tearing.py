@@ -83,8 +83,8 @@ def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
     by_unknown = np.array(ca.DM(ca.jacobian_sparsity(margins, x), 1))
     by_mode = np.array(ca.DM(ca.jacobian_sparsity(residual, modes), 1))
     found = {(int(i), int(j)) for i, j in zip(*np.nonzero(by_mode @ by_unknown), strict=True)}
-    slopes = ca.jacobian(residual, x)
-    for i, j, slope in zip(*slopes.sparsity().get_triplet(), slopes.nonzeros(), strict=True):
+    jacobian = ca.jacobian(residual, x)
+    for i, j, slope in zip(*jacobian.sparsity().get_triplet(), jacobian.nonzeros(), strict=True):
         if ca.depends_on(slope, modes):
             found.add((i, j))
     return found

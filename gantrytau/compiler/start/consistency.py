@@ -63,22 +63,22 @@ class Level:
         return np.array(rows, dtype=int), np.array(columns, dtype=int)
 
     @cached_property
-    def _exact_slopes(self) -> tuple[np.ndarray, ca.Function]:
+    def _exact_nonzeros(self) -> tuple[np.ndarray, ca.Function]:
         """Indices of the derivatives by exact numbers alone; the function of their values and term sizes."""
         x, _, jacobian = self._symbolic
-        slopes = jacobian.nonzeros()
+        nonzeros = jacobian.nonzeros()
         others = column([leaf for leaf in x.elements() if leaf.name() not in self.exact])
-        places = np.setdiff1d(range(len(slopes)), ca.jacobian_sparsity(column(slopes), others).row())
-        exact = [slopes[k] for k in places]
+        places = np.setdiff1d(range(len(nonzeros)), ca.jacobian_sparsity(column(nonzeros), others).row())
+        exact = [nonzeros[k] for k in places]
         return places, ca.Function("exact", [x], [column(exact), column(term_sizes(exact) if exact else [])])
 
     def certainty(self, numbers: np.ndarray) -> np.ndarray:
         """Matrix (residuals, leaves): 1 where a derivative by exact numbers exceeds its rounding, -1 where not, else 0."""
-        places, function = self._exact_slopes
+        places, function = self._exact_nonzeros
         found = np.zeros((len(self.residuals), len(self.leaves)))
-        slopes, sizes = (np.array(one).ravel() for one in function(numbers))
+        nonzeros, sizes = (np.array(one).ravel() for one in function(numbers))
         rows, columns = (side[places] for side in self.entries)
-        found[rows, columns] = np.where(np.abs(slopes) > ROUNDING * sizes, 1, -1)
+        found[rows, columns] = np.where(np.abs(nonzeros) > ROUNDING * sizes, 1, -1)
         return found
 
     @cached_property
@@ -102,13 +102,13 @@ class Level:
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residuals, and the entries of their derivatives by the leaves, at numbers of the leaves."""
-        residual, slopes = self._function(numbers)
-        return np.array(residual).ravel(), np.array(slopes).ravel()
+        residual, nonzeros = self._function(numbers)
+        return np.array(residual).ravel(), np.array(nonzeros).ravel()
 
-    def jacobian(self, slopes: np.ndarray) -> np.ndarray:
+    def jacobian(self, nonzeros: np.ndarray) -> np.ndarray:
         """The derivatives by the leaves as a dense matrix."""
         found = np.zeros((len(self.residuals), len(self.leaves)))
-        found[self.entries] = slopes
+        found[self.entries] = nonzeros
         return found
 
 
@@ -239,8 +239,8 @@ def _solve(
 
     def at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         around[columns] = point
-        f, slopes = level.look(around)
-        return f, level.jacobian(slopes)[:, columns]
+        f, nonzeros = level.look(around)
+        return f, level.jacobian(nonzeros)[:, columns]
 
     if propagate:
         missing = {column for k, column in enumerate(columns) if moving[k] not in started}
@@ -353,7 +353,7 @@ def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarra
         place[int(i), int(j)] = k
         if j in missing:
             rows.setdefault(int(i), set()).add(int(j))
-    f, slopes = level.look(point)
+    f, nonzeros = level.look(point)
     while rows:
         single = {next(iter(left)): i for i, left in rows.items() if len(left) == 1}
         if not single:
@@ -363,19 +363,19 @@ def _propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarra
             # the coordinate of a joint is in several rows, each with another unknown: it stays as it is
             single = {max(counts, key=lambda j: (counts[j], -j)): -1}
         largest = np.zeros(len(f))
-        np.maximum.at(largest, level.entries[0], np.nan_to_num(np.abs(slopes)))
+        np.maximum.at(largest, level.entries[0], np.nan_to_num(np.abs(nonzeros)))
         new = point.copy()
         for j, i in single.items():
-            slope = slopes[place[i, j]] if i >= 0 else 0.0
+            slope = nonzeros[place[i, j]] if i >= 0 else 0.0
             if i >= 0 and np.isfinite(f[i]) and abs(slope) > 1e-3 * largest[i] > 0:
                 new[j] -= f[i] / slope
         if np.any(new != point):
-            after, slopes_after = level.look(new)
+            after, nonzeros_after = level.look(new)
             wrong = [j for j, i in single.items() if not abs(after[i]) <= 1e-9 * max(1.0, abs(f[i]))]
             if wrong:  # not linear in these
                 new[wrong] = point[wrong]
-                after, slopes_after = level.look(new)
-            point, f, slopes = new, after, slopes_after
+                after, nonzeros_after = level.look(new)
+            point, f, nonzeros = new, after, nonzeros_after
         rows = {i: left - single.keys() for i, left in rows.items() if left - single.keys()}
     return point
 

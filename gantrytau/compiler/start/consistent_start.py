@@ -97,11 +97,11 @@ def refuse_outside(
             continue
         found = float(values_at(expression, values)[0, 0])
         if not one.low <= found <= one.high:
-            raise InitializationError(
-                f"{flat.name}: {one.name} starts at {found:g}, expected {one.low:g} to {one.high:g}, where its table is "
-                "defined: start within, add points, or let it go on with outside='hold' or 'linear'",
-                residuals=error.residuals,
-            ) from None
+            words = (
+                f"{one.name} starts at {found:g}, expected {one.low:g} to {one.high:g}, where its table is defined: start "
+                "within, add points, or let it go on with outside='hold' or 'linear'"
+            )
+            raise InitializationError(words, place=flat.name, residuals=error.residuals) from None
 
 
 def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.border.units import given as in_si
 from gantrytau.compiler.start.consistent_start import consistent_start
 from gantrytau.compiler.start.start_values import StartValues
@@ -23,7 +23,7 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
     consistent values are found.
     """
     if not isinstance(starts, Mapping):
-        raise ModelError(f"starts: found {starts!r}, expected {{name: value}}", argument="starts")
+        raise ModelError("expected {name: value}", place=dae.name, found=Given("starts", starts))
     dae.flat.refuse_twice("starts", starts)
     values, given = dict(dae.start), dict[str, str]()
     for name, value in starts.items():
@@ -35,10 +35,8 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
         for element, number in zip(elements, numbers, strict=True):
             symbol, start = _symbol(dae, element, number)
             if symbol in given and abs(values[symbol] - start) > SAME * max(abs(start), abs(values[symbol])):
-                raise ModelError(
-                    f"starts: {element} contradicts {given[symbol]}, of which it is an alias; give one of them",
-                    argument="starts",
-                )
+                words = f"{element} contradicts {given[symbol]}, of which it is an alias; give one of them"
+                raise ModelError(words, place="starts", argument="starts")
             values[symbol], given[symbol] = start, element
     asked = StartValues(values, frozenset(given) | dae.asked.fixed, dae.asked.fixed)
     found = consistent_start(dae.flat, dae.reduced, dae.indexed, asked)
@@ -48,15 +46,15 @@ def with_starts(dae: Translated, starts: Mapping[str, Any]) -> Translated:
 def _variables(dae: Translated, name: str) -> tuple[str, ...]:
     """The scalar variables of a name."""
     elements = dae.expand(name)
-    remedy = ""
-    if name in dae.parameters or any(n in dae.table.symbols for n in elements):
-        remedy = f"is a parameter, expected a variable; give it as parameters={{'{name}': ...}}"
+    words: tuple[str | Given, ...] = ()
+    if any(n in dae.table.symbols for n in elements):
+        words = ("is a parameter, expected a variable; give it in ", Given("parameters"))
     elif any(n in dae.inputs for n in elements):
-        remedy = f"is an input, expected a variable; give it as inputs={{'{name}': ...}}"
+        words = ("is an input, expected a variable; give it in ", Given("inputs"))
     elif any(n not in dae.reduced.aliases and n not in dae.known for n in elements):
-        remedy = "is no declared variable, but follows from others; give starts of those"
-    if remedy:
-        raise ModelError(f"starts: {name} {remedy}", argument="starts")
+        words = ("is no declared variable, but follows from others; give starts of those",)
+    if words:
+        raise ModelError(f"{name} ", *words, place="starts", argument="starts")
     return elements
 
 
@@ -66,8 +64,6 @@ def _symbol(dae: Translated, name: str, number: float) -> tuple[str, float]:
         return name, number  # sampled: held until the first instant
     alias = dae.reduced.aliases[name]
     if alias.root is None:
-        raise ModelError(
-            f"starts: {name} is constant and equal to {dae.table.number(alias.offset):g}; leave it out",
-            argument="starts",
-        )
+        words = f"{name} is constant and equal to {dae.table.number(alias.offset):g}; leave it out"
+        raise ModelError(words, place="starts", argument="starts")
     return alias.symbol, dae.table.number(alias.root_value(number))

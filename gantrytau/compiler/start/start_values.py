@@ -75,8 +75,7 @@ def _place(
     symbol, value = alias.symbol, table.number(alias.root_value(number))
     if variable.fixed and symbol in fixed and contradicts(values[symbol], value, size / abs(alias.factor)):
         raise InitializationError(
-            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which "
-            "it is an alias; "
+            f"{name}: fixed start {number:g} contradicts the fixed start of {fixed[symbol]}, of which it is an alias; "
             "release one with Start(...) instead of Fixed(...)"
         )
     rank = (not variable.fixed, not variable.chosen, name.count("."))

@@ -12,17 +12,18 @@ then leave the tool a region, of which three descriptions are compared:
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, check_words, whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.accuracy.joint_errors import JointErrors, joint_errors
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, shown, vectors
+from gantrytau.kinematics.poses import vectors
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
 from gantrytau.kinematics.rotations import angle_between, cross
 from gantrytau.language.model import Model
@@ -90,30 +91,24 @@ class Accuracy(Record):
 
         Where the links meet is computed for displaced carts without any approximation; the same errors in every pose.
         """
-        if not (isinstance(samples, (int, np.integer)) and samples >= 1):
-            raise ModelError(f"sampled: found samples={samples!r}, expected a whole number from 1")
+        whole("sampled", "samples", samples, least=1)
         random = np.random.default_rng(seed).normal(size=(samples, 3, 3))
         errors = random / np.linalg.norm(random, axis=-1, keepdims=True) * self.semi_axes
         return self.displaced(errors)
 
     def displaced(self, errors: np.ndarray) -> np.ndarray:
         """Displacements of the tool, (N, k, 3) in m, for errors of the carts (k, 3, 3) or (N, k, 3, 3) in m."""
-        given = floats(errors)
-        if (
-            given.ndim not in (3, 4)
-            or given.shape[-2:] != (3, 3)
-            or given.shape[:-3] not in ((), (len(self.r),))
-        ):
-            raise ModelError(
-                f"displaced: found errors of shape {given.shape}, expected (k, 3, 3) or ({len(self.r)}, k, 3, 3), a row an "
-                "actuator, in m; reshape them"
-            )
-        carts = self.carts[:, None] + given
+        shapes = (None, 3, 3), (len(self.r), None, 3, 3)
+        carts = self.carts[:, None] + array("displaced", "errors", errors, *shapes, unit="m")
         start = np.broadcast_to(self.r[:, None], (*carts.shape[:2], 3))
         return _meet(carts, self.lengths, start) - self.r[:, None]
 
     def plot(
-        self, quantity: str = "error", *, axes: str = "yz", file: str | os.PathLike[str] | None = None
+        self,
+        quantity: Literal["error", "bound", "areas", "angles", "dihedral angles"] = "error",
+        *,
+        axes: str = "yz",
+        file: str | os.PathLike[str] | None = None,
     ) -> "Figure":
         """Level plot over a slice of poses (Figures 4.8 to 4.10).
 
@@ -121,6 +116,7 @@ class Accuracy(Record):
         axes: the two coordinates that vary, such as "yz"; file: saves the figure there, too.
         Raises ModelError for another quantity, other axes, or poses that lie on one line.
         """
+        check_words(Accuracy.plot, locals())
         inside = np.isfinite(self.error)
         return draw_levels(self._panels(quantity), self.r, inside, self.carts, axes, file)
 
@@ -136,12 +132,8 @@ class Accuracy(Record):
             pairs = ((2, 3), (3, 1), (1, 2))
             angles = np.rad2deg(self.angles)
             return {f"angle of links {i} and {j} [°]": angles[:, k] for k, (i, j) in enumerate(pairs)}
-        if quantity == "dihedral angles":
-            angles = np.rad2deg(self.dihedral_angles)
-            return {f"angle of the sides that meet at link {i + 1} [°]": angles[:, i] for i in range(3)}
-        raise ModelError(
-            f"plot: found the quantity {quantity!r}, expected 'error', 'bound', 'areas', 'angles' or 'dihedral angles'"
-        )
+        angles = np.rad2deg(self.dihedral_angles)
+        return {f"angle of the sides that meet at link {i + 1} [°]": angles[:, i] for i in range(3)}
 
 
 @overload
@@ -171,7 +163,7 @@ def accuracy(
     """
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
     if errors is not None and semi_axes is None:
-        return joint_errors(kinematics, r, R, floats(errors))
+        return joint_errors(kinematics, r, R, errors)
     if semi_axes is None or errors is not None:
         raise ModelError(
             f"{kinematics.dae.name}: found {'neither' if errors is None else 'both'} semi_axes and errors, expected one: "
@@ -185,12 +177,10 @@ def accuracy(
         )
     places, _ = vectors(r, 3, "r", name)
     lengths = linked.geometry.length
-    axes = floats(semi_axes)
-    if axes.shape != (3, 3) or not ((axes >= 0) & (axes < 0.1 * lengths.min())).all():
-        raise ModelError(
-            f"{name}: found semi_axes {shown(semi_axes)}, expected three rows (one per actuator) of three lengths in m "
-            "(along x, y, z of the base), of at least 0 and below a tenth of a link; convert millimetres"
-        )
+    axes = array("accuracy", "semi_axes", semi_axes, (3, 3), unit="m", least=0.0)
+    if not (axes < 0.1 * lengths.min()).all():
+        found = Given("semi_axes", semi_axes)
+        raise ModelError("expected lengths in m below a tenth of a link", place="accuracy", found=found)
     carts = linked.geometry.cart_joints(kinematics.ik(places))
     parts = [slice(k, k + _BLOCK) for k in range(0, len(places), _BLOCK)] or [slice(0)]
     blocks = [_of_block(carts[part], lengths, places[part], axes) for part in parts]

@@ -7,16 +7,17 @@ in one of the corners of the box of errors; what is exact moves it by forward ki
 import os
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import array, check_words, whole
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.accuracy.figures import draw_levels
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, shown
+from gantrytau.kinematics.poses import poses
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,34 +60,30 @@ class JointErrors(Record):
 
     def displaced(self, errors: ArrayLike) -> np.ndarray:
         """Displacements of the tool (N, k, 3) in m for errors of the joints, (k, n), by forward kinematics."""
-        given = floats(errors)
-        if given.ndim != 2 or given.shape[1] != len(self.errors):
-            raise ModelError(
-                f"displaced: found errors of shape {given.shape}, expected (k, {len(self.errors)}), a row of errors of the "
-                "joints in m and rad; reshape them"
-            )
         found = []
-        for error in given:
+        for error in array("displaced", "errors", errors, (None, len(self.errors))):
             near = self.r if self.R is None else (self.r, self.R)
             found.append(self.kinematics.fk(self.q + error, near=near)[0] - self.r)
         return np.stack(found, axis=1) if found else np.zeros((len(self.r), 0, 3))
 
     def sampled(self, samples: int = 100, *, seed: int = 0) -> np.ndarray:
         """Displacements of the tool for random errors, even over their box, (N, samples, 3) in m: the Monte Carlo check."""
-        if not (isinstance(samples, (int, np.integer)) and samples >= 1):
-            raise ModelError(f"sampled: found samples={samples!r}, expected a whole number from 1")
+        whole("sampled", "samples", samples, least=1)
         random = np.random.default_rng(seed)
         return self.displaced(random.uniform(-1, 1, (samples, len(self.errors))) * self.errors)
 
     def plot(
-        self, quantity: str = "error", *, axes: str = "xy", file: str | os.PathLike[str] | None = None
+        self,
+        quantity: Literal["error", "turn"] = "error",
+        *,
+        axes: str = "xy",
+        file: str | os.PathLike[str] | None = None,
     ) -> "Figure":
         """Level plot over a slice of poses; quantity: "error" or "turn"; axes: the coordinates that vary, such as "xy".
 
         Raises ModelError for another quantity, other axes, or poses that lie on one line.
         """
-        if quantity not in ("error", "turn"):
-            raise ModelError(f"plot: found the quantity {quantity!r}, expected 'error' or 'turn'")
+        check_words(JointErrors.plot, locals())
         values = self.error * 1e6 if quantity == "error" else np.rad2deg(self.turn)
         label = (
             "largest error of the tool [µm]" if quantity == "error" else "largest rotation of the tool [°]"
@@ -95,17 +92,10 @@ class JointErrors(Record):
         return draw_levels({label: values}, self.r, np.isfinite(values), none, axes, file)
 
 
-def joint_errors(
-    kinematics: Kinematics, r: ArrayLike, R: ArrayLike | None, errors: np.ndarray
-) -> JointErrors:
-    """See `accuracy`; errors: (n,), checked here."""
-    name, count = kinematics.dae.name, len(kinematics.joints)
-    if errors.shape != (count,) or not ((errors >= 0) & (errors < np.inf)).all():
-        raise ModelError(
-            f"{name}: found errors {shown(errors)}, expected ({count},), the largest of {', '.join(kinematics.joints)} in m "
-            "and rad, of at least 0; ellipsoids (3, 3) of carts are for robots on three links"
-        )
-    at = poses(r, R, name)
+def joint_errors(kinematics: Kinematics, r: ArrayLike, R: ArrayLike | None, errors: ArrayLike) -> JointErrors:
+    """See `accuracy`; errors: (n,), the largest of each joint."""
+    errors = array("accuracy", "errors", errors, (len(kinematics.joints),), least=0.0)
+    at = poses(r, R, "accuracy")
     turns = at.R
     if turns is None and kinematics.turning:
         turns = np.array(np.broadcast_to(kinematics.home.R, (len(at.r), 3, 3)))

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gantrytau.border.checks import array, number, whole
 from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.modes.assembly_modes import AssemblyModes, assembly_modes
 from gantrytau.kinematics.modes.figures import draw_histogram, draw_modes, mode_scene
-from gantrytau.kinematics.poses import real, vectors
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.language.model import Model
 from gantrytau.results.result import Result
@@ -59,9 +59,9 @@ class AssemblyStudy(Record):
             f"{self.counts.mean():.3g} in the mean",
             "  real modes  poses  without crossed links",
         ]
-        for number, poses in self.histogram.items():
-            free = self.feasible[self.counts == number]
-            lines.append(f"  {number:10d}  {poses:5d}  {_span(free)}")
+        for count, poses in self.histogram.items():
+            free = self.feasible[self.counts == count]
+            lines.append(f"  {count:10d}  {poses:5d}  {_span(free)}")
         lines.append(f"all 40 found in {int(self.complete.sum())} of {len(self)} poses")
         if np.isfinite(self.nearest).any():
             least, far = np.nanmin(self.nearest), np.nanmax(self.nearest)
@@ -95,12 +95,8 @@ class AssemblyStudy(Record):
 
     def within(self, limit: float) -> np.ndarray:
         """How many real modes have no ball joint beyond an angle in rad, (N,): those that the robot could be in."""
-        if not 0 < real(limit) <= np.pi:
-            raise ModelError(
-                f"within: found a limit of {limit!r}, expected an angle above 0 and up to pi in rad; convert degrees with "
-                "math.radians"
-            )
-        return np.array([int((angles <= real(limit)).sum()) for angles in self.angles])
+        limit = number("within", "limit", limit, unit="rad", above=0.0, most=np.pi)
+        return np.array([int((angles <= limit).sum()) for angles in self.angles])
 
     @property
     def histogram(self) -> dict[int, int]:
@@ -172,12 +168,7 @@ class AssemblyStudy(Record):
         return found
 
     def _row(self, row: int) -> int:
-        if not (isinstance(row, int | np.integer) and 0 <= row < len(self)):
-            raise ModelError(
-                f"assembly_study: found row {row!r}, expected 0 to {len(self) - 1}, as there are poses",
-                argument="row",
-            )
-        return int(row)
+        return whole("assembly_study", "row", row, least=0, most=len(self) - 1)
 
 
 def assembly_study(
@@ -194,11 +185,10 @@ def assembly_study(
     Raises ModelError for robots without six links, shapes and numbers that do not fit, StructureError where modes are no
     separate poses.
     """
+    diameter = number("assembly_study", "diameter", diameter, unit="m", least=0.0)
     given = list(robot) if isinstance(robot, (list, tuple)) else [robot]
     if not given:
         raise ModelError("assembly_study: found no robot, expected one or several; give instances")
-    if not 0 <= real(diameter) < np.inf:
-        raise ModelError(f"assembly_study: found diameter={diameter!r}, expected 0 or more, in m")
     robots = [_with_six_links(one) for one in given]
     places = [_coordinates(one, q) for one in robots]
     modes, branch, angles = [], [], []
@@ -238,12 +228,11 @@ def _with_six_links(robot: Any) -> Kinematics:
 
 def _coordinates(robot: Kinematics, q: Any) -> np.ndarray:
     """Actuator coordinates (N, n), N above 0, all finite."""
-    rows, _ = vectors(q, len(robot.joints), "q", "assembly_study")
-    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if wrong.size or not len(rows):
-        found = f"numbers that are not finite in row {wrong[0]} of q" if wrong.size else "no rows of q"
+    count = len(robot.joints)
+    rows = np.atleast_2d(array("assembly_study", "q", q, (count,), (None, count)))
+    if not len(rows):
         raise ModelError(
-            f"assembly_study: found {found}, expected coordinates in m and rad; leave out what is unknown"
+            "assembly_study: found no rows of q, expected coordinates in m and rad", argument="q"
         )
     return rows
 

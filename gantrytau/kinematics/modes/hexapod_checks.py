@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError, StructureError
+from gantrytau.border.checks import array, number
+from gantrytau.border.refusal import StructureError
 from gantrytau.kinematics.modes.link_crossings import PAIRS
 from gantrytau.kinematics.modes.study_coordinates import quadrics
 from gantrytau.kinematics.modes.study_roots import placed
-from gantrytau.kinematics.poses import floats, real, shown
 
 EXACT = 1e-9  # by the size of the hexapod: joints nearer than this coincide
 DEPENDENT = 1e-10  # least singular value of the conditions of the links by the largest; the F1 has 0.05
@@ -17,17 +17,10 @@ _PATH = "assembly_modes"
 
 def checked_hexapod(base: Any, platform: Any, lengths: Any, diameter: float) -> tuple[np.ndarray, ...]:
     """Joints and lengths as arrays of floats. Raises ModelError and StructureError as `assembly_modes` says."""
-    base, platform = _array(base, "base", (6, 3)), _array(platform, "platform", (6, 3))
-    lengths = _array(lengths, "lengths", (6,))
-    if (lengths <= 0).any():
-        k = int(np.flatnonzero(lengths <= 0)[0])
-        raise ModelError(
-            f"{_PATH}: found lengths[{k}] = {lengths[k]:g}, expected lengths above 0 m; a link joins two places"
-        )
-    if not 0 <= real(diameter) < np.inf:
-        raise ModelError(
-            f"{_PATH}: found diameter {diameter!r}, expected 0 or more, in m; leave it out for thin links"
-        )
+    number(_PATH, "diameter", diameter, unit="m", least=0.0)
+    base = array(_PATH, "base", base, (6, 3), unit="m")
+    platform = array(_PATH, "platform", platform, (6, 3), unit="m")
+    lengths = array(_PATH, "lengths", lengths, (6,), unit="m", above=0.0)
     for name, joints in (("base", base), ("platform", platform)):
         if _extents(joints)[1] <= EXACT * max(_extents(joints)[0], EXACT * lengths.max()):
             raise StructureError(
@@ -56,25 +49,6 @@ def specialities(base: np.ndarray, platform: np.ndarray, lengths: np.ndarray) ->
     alike = (np.abs(_distances(base) - _distances(platform)) < small) & (_distances(base) >= small)
     if pairs := _pairs(alike & (np.abs(lengths[i] - lengths[j]) < small)):
         found.append(f"links {pairs} form parallelograms: modes with crossed links are near singular ones")
-    return found
-
-
-def _array(value: Any, name: str, shape: tuple[int, ...]) -> np.ndarray:
-    expected = f"{'six joints, (6, 3)' if len(shape) == 2 else 'six lengths, (6,)'} in m"
-    found = floats(value)
-    if found.shape == ():
-        raise ModelError(
-            f"{_PATH}: found {name} {shown(value)}, expected {expected}; give numbers, not complex ones"
-        )
-    if found.shape != shape:
-        raise ModelError(
-            f"{_PATH}: found {name} of shape {found.shape}, expected {expected}; one hexapod and one pose at a time"
-        )
-    if not np.isfinite(found).all():
-        k = int(np.flatnonzero(~np.isfinite(found).reshape(6, -1).all(1))[0])
-        raise ModelError(
-            f"{_PATH}: found {name}[{k}] = {found[k]}, expected finite numbers in m; leave no gaps"
-        )
     return found
 
 

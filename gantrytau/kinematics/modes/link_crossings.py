@@ -12,9 +12,8 @@ import numpy as np
 from gantrytau.kinematics.workspace.obstacles import between_segments
 
 ALIKE = 2.0  # ratio of distances of joints, base by platform; above, and below its inverse, links form no parallelogram
-PARALLEL = (
-    1e-9  # square of the sine of the angle of two links, and distance of two joints by the length of links
-)
+# square of the sine of the angle of two links, and distance of two joints by the length of links
+PARALLEL = 1e-9
 PAIRS = np.array(list(combinations(range(6), 2)))
 
 

@@ -21,11 +21,7 @@ LONGEST = 0.5  # m or rad of one step; only far away, where the linear model say
 
 
 def solve_lengths(
-    geometry: RodGeometry,
-    q: np.ndarray,
-    r: np.ndarray,
-    R: np.ndarray,
-    free: Sequence[int],
+    geometry: RodGeometry, q: np.ndarray, r: np.ndarray, R: np.ndarray, free: Sequence[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Coordinates q (N, n), r (N, 3), R (N, 3, 3) at which links have their lengths, and the number of iterations (N,).
 

@@ -102,6 +102,15 @@ class RodGeometry(Record):
         turns = [(R @ table.axis, place) for table, (place, R) in zip(tables, turning, strict=True)]
         return (*carriers[-1], turns)
 
+    def link_directions(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors along the links from cart to plate in the axes of what carries them, and in plate axes, (N, m, 3) in m."""
+        along = self.plate_joints(r, R) - self.cart_joints(q)
+        on_cart = np.empty_like(along)
+        for arm in self.arms:
+            links = self.links_of(arm)
+            on_cart[:, links] = along[:, links] @ self.frames(arm, q)[1]
+        return on_cart, along @ R
+
     def slopes(
         self, q: np.ndarray, r: np.ndarray, R: np.ndarray, *, joints: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -3,15 +3,17 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
+from gantrytau.border.checks import check_words, number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.kinematics.poses import real
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Limits
 from gantrytau.language.self_description.appearance import Cloud, Shape
+
+Axis = Literal["x", "y", "z"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,22 +136,20 @@ class Cells(Record):
         # of k^d places in a cell the border cuts k^(d - 2) rows of k: an error of k^(d / 2) places
         return float(size * rows / np.sqrt(12.0) * self.refine ** (-dimensions / 2))
 
-    def cross_section(self, axis: str = "x", at: float | None = None) -> float:
+    def cross_section(self, axis: Axis = "x", at: float | None = None) -> float:
         """Area across an axis at a coordinate in m, by default the largest; m2, of the layer of cells around it."""
-        number = axis_number(self.name, axis)
-        layers = np.moveaxis(self.fraction, number, 0)
-        others = np.delete(self.extent, number).prod()
+        check_words(Cells.cross_section, locals())
+        across = "xyz".index(axis)
+        layers = np.moveaxis(self.fraction, across, 0)
+        others = np.delete(self.extent, across).prod()
         areas = layers.reshape(len(layers), -1).mean(axis=1) * others
-        return float(areas.max() if at is None else areas[self.layer(number, at)])
+        return float(areas.max() if at is None else areas[self.layer(across, at)])
 
-    def layer(self, number: int, at: float) -> int:
-        """The layer of cells that contains a coordinate."""
-        low, high = self.box[number]
-        if not low <= real(at) <= high:
-            raise ModelError(
-                f"{self.name}: found {'xyz'[number]} = {at!r} m, expected {low:.6g} to {high:.6g}, the box of the workspace"
-            )
-        count = self.shape[number]
+    def layer(self, axis: int, at: float) -> int:
+        """The layer of cells that contains a coordinate along axis 0, 1 or 2."""
+        low, high = self.box[axis]
+        at = number(self.name, "at", at, unit="m", least=low, most=high)
+        count = self.shape[axis]
         return min(int((at - low) / (high - low) * count), count - 1) if high > low else 0
 
 
@@ -162,10 +162,3 @@ def border(inside: np.ndarray) -> np.ndarray:
         part = padded[tuple(slice(k, k + n) for k, n in zip(shift, inside.shape, strict=True))]
         every, some = every & part, some | part
     return some & ~every
-
-
-def axis_number(name: str, axis: Any) -> int:
-    """0, 1 or 2 for x, y or z; ModelError for another axis."""
-    if axis not in ("x", "y", "z"):
-        raise ModelError(f"{name}: found the axis {axis!r}, expected 'x', 'y' or 'z'")
-    return "xyz".index(axis)

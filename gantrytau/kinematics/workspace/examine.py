@@ -2,7 +2,7 @@
 
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import instance
 from gantrytau.kinematics.kinematics import Kinematics
 from gantrytau.kinematics.workspace.model_limits import ModelExaminer
 from gantrytau.kinematics.workspace.pose_limits import Examined, Examiner, Limits
@@ -23,10 +23,6 @@ def examine(
 
 def examiner_of(robot: Model | Kinematics, limits: Limits) -> Examiner | ModelExaminer:
     """A robot made ready for many poses, with limits."""
+    instance("workspace", "limits", limits, Limits, "Limits, such as Limits(strokes=(0.0, 2.0))")
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
-    if not isinstance(limits, Limits):
-        raise ModelError(
-            f"{kinematics.dae.name}: found limits {limits!r}, expected Limits, such as Limits(strokes=(0.0, 2.0)); name "
-            "them there"
-        )
     return (ModelExaminer if kinematics.through_equations else Examiner)(kinematics, limits)

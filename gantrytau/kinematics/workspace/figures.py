@@ -36,10 +36,6 @@ def draw_layer(
 
     if file is not None:
         check_suffix(file)
-    if quantity != "limits" and quantity not in _UNITS:
-        raise ModelError(
-            f"plot: found the quantity {quantity!r}, expected 'limits', {', '.join(map(repr, _UNITS))}"
-        )
     others = [k for k in range(3) if k != number]
     extent = found.box[others, 1] - found.box[others, 0]
     height = np.clip(5.0 * extent[1] / max(extent[0], 1e-9) + 1.0, 3.0, 8.0)
@@ -58,7 +54,7 @@ def draw_layer(
     axis.set_xlim(*found.box[others[0]])
     axis.set_ylim(*found.box[others[1]])
     axis.set_aspect("equal")
-    area = found.cross_section("xyz"[number], float(at))
+    area = found.cross_section(("x", "y", "z")[number], float(at))
     axis.set_title(f"{'xyz'[number]} = {at:.3g} m, inside {area:.3g} m²")
     return finished(figure, file)
 

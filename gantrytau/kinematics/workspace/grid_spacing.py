@@ -1,13 +1,13 @@
 """How wide the cells of a grid are, of which so many fill a volume."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
-from gantrytau.kinematics.poses import floats, real, shown
+from gantrytau.border.checks import array, check_words, whole
+from gantrytau.border.refusal import Given, ModelError, short
 from gantrytau.kinematics.workspace.cells import Cells
 
 MOST = 10**12  # places, of which no machine examines as many
@@ -15,7 +15,9 @@ CLOSE = 0.02  # of the number of places inside
 ROUNDS = 8  # of a guess, which the number of places inside corrects; whole cells leave a few per cent
 
 
-def grid_spacing(places: int, of: float | ArrayLike | Cells, *, dimensions: int | None = None) -> float:
+def grid_spacing(
+    places: int, of: float | ArrayLike | Cells, *, dimensions: Literal[1, 2, 3, None] = None
+) -> float:
     """The side in m of equal cells of which a number fills a volume, an area or a length.
 
         grid_spacing(1000, 2.0)                                   # 1000 cells in 2 m3
@@ -25,15 +27,14 @@ def grid_spacing(places: int, of: float | ArrayLike | Cells, *, dimensions: int 
     of: a size, in m3, or in m2 with dimensions=2 and m with dimensions=1; a box (3, 2) of (least, largest) x, y, z, where
     equal ones make a slice; or a workspace. Raises ModelError for a number below one and for what has no size.
     """
-    count = _whole(places, "grid_spacing")
+    check_words(grid_spacing, locals())
+    count = whole("grid_spacing", "places", places, least=1, most=MOST)
     size, sides = _size(of)
-    if dimensions is not None and (
-        dimensions not in (1, 2, 3) or (sides is not None and sides != dimensions)
-    ):
+    if dimensions is not None and sides not in (None, dimensions):
         raise ModelError(
-            f"grid_spacing: found dimensions={dimensions!r}, expected "
-            f"{'1, 2 or 3' if sides is None else f'{sides}, as it has, or nothing'}",
-            argument="dimensions",
+            f"expected {sides}, as it has, or nothing",
+            place="grid_spacing",
+            found=Given("dimensions", dimensions),
         )
     return float((size / count) ** (1.0 / (sides or dimensions or 3)))
 
@@ -61,25 +62,15 @@ def settled_spacing(places: int, box: np.ndarray, inside: Callable[[float], int]
     return best
 
 
-def _whole(places: Any, where: str) -> int:
-    whole = isinstance(places, (int, np.integer)) and not isinstance(places, bool)
-    if not whole or not 1 <= places <= MOST:
-        found = "more" if whole and places > MOST else f"places={places!r}"
-        raise ModelError(
-            f"{where}: found {found}, expected a whole number from 1 to {MOST:.0e}", argument="places"
-        )
-    return int(places)
-
-
 def checked_places(places: Any, spacing: Any, where: str) -> None:
     """ModelError for a number of places that is none, or that stands beside a spacing."""
     if places is None:
         return
-    _whole(places, where)
+    whole(where, "places", places, least=1, most=MOST)
     if spacing is not None:
+        found = Given("places", places)
         raise ModelError(
-            f"{where}: found both spacing={spacing!r} and places={places!r}, expected one of them; leave one out",
-            argument="places",
+            "expected none beside ", Given("spacing", spacing), "; leave one out", place=where, found=found
         )
 
 
@@ -90,15 +81,11 @@ def _size(of: Any) -> tuple[float, int | None]:
         size, sides = float(of.fraction.mean() * extent.prod()), len(extent)
         words = f"a workspace of {of.name} with nothing inside"
     else:
-        found = floats(of)
-        words = shown(of)
-        if found.shape == ():
-            size, sides = real(of), None
-        elif found.shape == (3, 2) and (found[:, 0] <= found[:, 1]).all():
+        found = array("grid_spacing", "of", of, (), (3, 2))
+        size, sides, words = float(found) if found.shape == () else np.nan, None, short(of)
+        if found.shape and (found[:, 0] <= found[:, 1]).all():
             extent = found[:, 1] - found[:, 0]
             size, sides = float(extent[extent > 0].prod()), int((extent > 0).sum())
-        else:
-            size, sides = np.nan, None
     if not 0 < size < np.inf or sides == 0:
         raise ModelError(
             f"grid_spacing: found {words}, expected a size above 0, a box of (least, largest) x, y and z in m, or a "

@@ -2,25 +2,22 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.checks import array, instance
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, shown
+from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.workspace.obstacles import segment_distance
 from gantrytau.kinematics.workspace.pose_limits import REASONS, Examined, Limits, in_blocks, strokes_of
 from gantrytau.language.self_description.appearance import Stick
 
 BLOCK = 32768  # poses, as many as array functions take together
-LINKS = (
-    "ball_joint",
-    "cart_axes",
-    "plate_axes",
-    "home",
-    "angle_margin",
-)  # limits of robots whose links are known
+# limits of robots whose links are known
+LINKS = ("ball_joint", "cart_axes", "plate_axes", "home", "angle_margin")
 
 
 class ModelExaminer:
@@ -140,14 +137,11 @@ class ModelExaminer:
         return least - self.limits.clearance
 
 
-def _passive(kinematics: Kinematics, passive: object) -> dict[str, tuple[float, float]]:
+def _passive(kinematics: Kinematics, passive: Any) -> dict[str, tuple[float, float]]:
     """Limits of passive joints by name; ModelError for what they cannot be."""
     if passive is None:
         return {}
-    if not isinstance(passive, Mapping):
-        raise ModelError(
-            f"Limits.passive: found {passive!r}, expected (least, largest) by name of a variable"
-        )
+    instance("Limits", "passive", passive, Mapping, "(least, largest) by name of a variable")
     found = {}
     for name, bounds in passive.items():
         if name not in kinematics.dae.variables:
@@ -156,12 +150,10 @@ def _passive(kinematics: Kinematics, passive: object) -> dict[str, tuple[float, 
                 f"{did_you_mean(str(name), kinematics.dae.variables)}",
                 argument="passive",
             )
-        pair = floats(bounds)
-        if pair.shape != (2,) or not pair[0] < pair[1]:
-            raise ModelError(
-                f"Limits.passive: found {shown(bounds)} of {name}, expected (least, largest)",
-                argument="passive",
-            )
+        pair = array("Limits", "passive", bounds, (2,), finite=False)
+        if not pair[0] < pair[1]:
+            wrong = Given("passive", {name: bounds})
+            raise ModelError("expected (least, largest)", place="Limits", found=wrong)
         found[name] = (float(pair[0]), float(pair[1]))
     return found
 

@@ -11,9 +11,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gantrytau.border.checks import array, number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau.kinematics.poses import floats, real, shown
+from gantrytau.kinematics.poses import rotations
 from gantrytau.language.self_description.appearance import Ball, Cuboid, Shape, Stick
 
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
@@ -40,15 +41,16 @@ class Box(Record):
     R: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def __post_init__(self):
-        low, high = _vector("Box.low", self.low), _vector("Box.high", self.high)
+        low, high = (array("Box", name, getattr(self, name), (3,), unit="m") for name in ("low", "high"))
         if not (low < high).all():
             raise ModelError(
                 f"Box: found low {low.tolist()} and high {high.tolist()}, expected low < high; {_REMEDY}"
             )
-        R = floats(self.R)
-        if R.shape != (3, 3) or not np.allclose(R.T @ R, np.eye(3), rtol=0, atol=1e-6):
-            raise ModelError(f"Box.R: found {shown(self.R)}, expected a rotation matrix (3, 3)")
-        for name, value in (("low", low), ("high", high), ("R", R)):
+        for name, value in (
+            ("low", low),
+            ("high", high),
+            ("R", rotations("Box", "R", self.R, 1).reshape(3, 3)),
+        ):
             object.__setattr__(self, name, value)
 
     def shapes(self) -> Iterator[Shape]:
@@ -172,17 +174,9 @@ class Capsule(Record):
 
 
 def _hold_segment(body: Any, kind: str) -> None:
+    object.__setattr__(body, "radius", number(kind, "radius", body.radius, unit="m", above=0.0))
     for name in ("start", "end"):
-        object.__setattr__(body, name, _vector(f"{kind}.{name}", getattr(body, name)))
-    if not 0 < real(body.radius) < np.inf:
-        raise ModelError(f"{kind}.radius: found {body.radius!r}, expected a length above 0 m; {_REMEDY}")
-
-
-def _vector(place: str, value: Any) -> np.ndarray:
-    vector = floats(value)
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise ModelError(f"{place}: found {shown(value)}, expected three finite numbers; {_REMEDY}")
-    return vector
+        object.__setattr__(body, name, array(kind, name, getattr(body, name), (3,), unit="m"))
 
 
 def segment_distance(obstacle: Obstacle, start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -1,17 +1,18 @@
 """What limits the poses of a robot: reach, strokes, ball joints, obstacles; and by how much poses keep these limits."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, instance, number
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, poses, real, shown
+from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rods.rod_robots import SixRods
 from gantrytau.kinematics.rotations import angle_between
@@ -59,21 +60,11 @@ class Limits(Record):
     lever: float = 1.0
 
     def __post_init__(self):
-        for name in ("link_radius", "stroke_margin", "turn_margin", "angle_margin", "clearance"):
-            if not 0 <= real(getattr(self, name)) < np.inf:
-                raise ModelError(
-                    f"Limits.{name}: found {getattr(self, name)!r}, expected a number of at least 0"
-                )
-        if not (0 < real(self.ball_joint) <= math.pi or self.ball_joint == math.inf):
-            raise ModelError(
-                f"Limits.ball_joint: found {self.ball_joint!r}, expected an angle above 0 and up to pi in rad; convert "
-                "degrees with math.radians"
-            )
-        if not (real(self.condition) > 1 and 0 < real(self.lever) < np.inf):
-            raise ModelError(
-                f"Limits: found condition={self.condition!r} and lever={self.lever!r}, expected a ratio above 1 and a "
-                "length above 0 m"
-            )
+        self._in_si(("link_radius", "stroke_margin", "clearance"), unit="m", least=0.0)
+        self._in_si(("turn_margin", "angle_margin"), unit="rad", least=0.0)
+        self._in_si(("lever",), unit="m", above=0.0)
+        self._in_si(("ball_joint",), unit="rad", above=0.0, most=math.pi)
+        self._in_si(("condition",), above=1.0)
         for name in ("obstacles", "plate"):
             bodies = getattr(self, name)
             bodies = tuple(bodies) if isinstance(bodies, (list, tuple)) else (bodies,)
@@ -82,8 +73,13 @@ class Limits(Record):
             if isinstance(body, type) or not hasattr(body, "distance"):
                 raise ModelError(f"Limits.obstacles: found {body!r}, expected Box, Cylinder or Capsule")
         for body in self.plate:
-            if not isinstance(body, Capsule):
-                raise ModelError(f"Limits.plate: found {body!r}, expected Capsule in plate axes")
+            instance("Limits", "plate", body, Capsule, "Capsule in plate axes")
+
+    def _in_si(self, names: Iterable[str], **limits: Any) -> None:
+        """Numbers in SI, those that limit nothing as they are."""
+        for name in names:
+            if (found := getattr(self, name)) != math.inf:
+                object.__setattr__(self, name, number("Limits", name, found, **limits))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +115,6 @@ class Examiner:
     def __init__(self, robot: Model | Kinematics, limits: Limits):
         self.kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
         self.name = self.kinematics.dae.name
-        if not isinstance(limits, Limits):
-            raise ModelError(
-                f"{self.name}: found limits {limits!r}, expected Limits, such as Limits(strokes=(0.0, 2.0)); name them there"
-            )
         self.limits = limits
         self.linked = self.kinematics.linked("workspace")
         if limits.passive is not None or math.isfinite(limits.condition):
@@ -159,13 +151,9 @@ class Examiner:
         Out of reach are NaN, poses in which links miss their lengths, and an arm on the other side of its cart than at
         the start of the model. Raises ModelError for other shapes.
         """
-        at, joints = poses(r, R, self.name), floats(q)
-        if at.R is None or joints.shape != (len(at.r), len(self.kinematics.joints)):
-            raise ModelError(
-                f"{self.name}: found actuators {shown(q)} and orientations {shown(R)} of {len(at.r)} poses, expected q "
-                f"({len(at.r)}, {len(self.kinematics.joints)}) and R; take both from Kinematics.fk"
-            )
-        turns = at.R
+        at = poses(r, R, self.name)
+        joints = array(self.name, "q", q, (len(at.r), len(self.kinematics.joints)), finite=False)
+        turns = instance(self.name, "R", at.R, np.ndarray, "orientations; take them from Kinematics.fk")
 
         def block(part: slice) -> dict[str, np.ndarray]:
             known, place, turn = joints[part], at.r[part], turns[part]
@@ -230,18 +218,10 @@ class Examiner:
         if self._axes is None:
             return np.where(np.isnan(q[:, 0]), np.nan, np.inf)
         angles = [
-            angle_between(u, axes) for u, axes in zip(self._directions(q, r, R), self._axes, strict=True)
+            angle_between(u, axes)
+            for u, axes in zip(self.geometry.link_directions(q, r, R), self._axes, strict=True)
         ]
         return self.limits.ball_joint - np.max(angles, axis=(0, 2)) - self.limits.angle_margin
-
-    def _directions(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Vectors along the links from cart to plate in the axes of what carries them, and in plate axes, (N, m, 3)."""
-        u = self.geometry.plate_joints(r, R) - self.geometry.cart_joints(q)
-        on_cart = np.empty_like(u)
-        for arm in range(self.carts):
-            links = self.geometry.links_of(arm)
-            on_cart[:, links] = u[:, links] @ self.geometry.frames(arm, q)[1]
-        return on_cart, u @ R
 
     def _joint_axes(self) -> list[np.ndarray]:
         """Axes of the ball joints on carts and on the plate, (m, 3) each: as given, or along the links at home."""
@@ -249,16 +229,17 @@ class Examiner:
         r = home.r if self.limits.home is None else self.limits.home
         at = poses(r, None, f"{self.name}: Limits.home").r[:1]
         q, R = self._joints_and_orientation(at, None)
-        usual = [directions[0] for directions in self._directions(q, at, R)]
+        usual = [directions[0] for directions in self.geometry.link_directions(q, at, R)]
         found = []
         for name, along in zip(("cart_axes", "plate_axes"), usual, strict=True):
             given = getattr(self.limits, name)
-            axes = along if given is None else floats(given)
-            if axes.shape not in ((3,), along.shape) or not (np.linalg.norm(axes, axis=-1) > 0).all():
+            axes = along if given is None else array("Limits", name, given, (3,), along.shape)
+            if not (np.linalg.norm(axes, axis=-1) > 0).all():
                 raise ModelError(
-                    f"{self.name}: found {name} {shown(axes if given is None else given)}, expected one "
-                    f"direction (3,) or one per link {along.shape}; where they follow from "
-                    "Limits(home=...), take a place in reach"
+                    f"found {name} = {axes.tolist()}, expected directions, none of them zero; where they follow from "
+                    "Limits(home=...), take a place in reach",
+                    place=self.name,
+                    argument=name,
                 )
             found.append(np.broadcast_to(axes, along.shape))
         return found
@@ -304,15 +285,15 @@ def strokes_of(kinematics: Kinematics, carts: int, strokes: Any) -> np.ndarray:
     if strokes is None:
         return kinematics.limits
     actuators = len(kinematics.joints)
-    found = floats(strokes)
+    found = array("Limits", "strokes", strokes, (2,), (carts, 2), (actuators, 2), finite=False)
     if found.shape == (2,):
         found = np.tile(found, (carts, 1))
     if found.shape == (carts, 2):
         found = np.vstack([found, kinematics.limits[carts:]])
-    if found.shape != (actuators, 2) or not (found[:, 0] < found[:, 1]).all():
+    if not (found[:, 0] < found[:, 1]).all():
         raise ModelError(
-            f"Limits.strokes: found {shown(strokes)}, expected ({actuators}, 2) of (least, largest) coordinates of "
-            f"{kinematics.dae.name} in m and rad, or one such pair for all carts",
-            argument="strokes",
+            f"expected (least, largest) coordinates of {kinematics.dae.name} in m and rad",
+            place="Limits",
+            found=Given("strokes", strokes),
         )
     return found

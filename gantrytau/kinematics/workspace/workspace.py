@@ -2,15 +2,15 @@
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, check_words, number, whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.kinematics.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, real, shown
-from gantrytau.kinematics.workspace.cells import Cells, axis_number, border
+from gantrytau.kinematics.workspace.cells import Axis, Cells, border
 from gantrytau.kinematics.workspace.examine import examiner_of
 from gantrytau.kinematics.workspace.figures import draw_layer, draw_solid
 from gantrytau.kinematics.workspace.grid_spacing import checked_places, settled_spacing
@@ -30,10 +30,10 @@ class Workspace(Cells):
 
     def plot(
         self,
-        axis: str | None = None,
+        axis: Axis | None = None,
         at: float | None = None,
         *,
-        quantity: str = "limits",
+        quantity: Literal["limits", "stroke", "turn", "angle", "clearance"] = "limits",
         file: str | os.PathLike[str] | None = None,
     ) -> "Figure":
         """One layer across an axis (Figures 2.4, 4.16, 5.22 to 5.24), by default the largest across x.
@@ -42,13 +42,14 @@ class Workspace(Cells):
         of what is left of one. Obstacles and guideways are drawn where the layer cuts them. file: saves it there, too.
         Raises ModelError for other axes and quantities.
         """
+        check_words(Workspace.plot, locals())
         if self.dimensions < 2:
             raise ModelError(
                 f"{self.name}: found a workspace with the extent {self.extent.tolist()} m, expected a slice or a solid to "
                 "draw; give a wider box"
             )
         flat = np.flatnonzero(self.extent == 0)
-        number = axis_number(self.name, axis or "xyz"[flat[0] if len(flat) else 0])
+        number = "xyz".index(axis or "xyz"[flat[0] if len(flat) else 0])
         shares = np.moveaxis(self.fraction, number, 0).reshape(self.shape[number], -1).mean(axis=1)
         layer = int(shares.argmax()) if at is None else self.layer(number, at)
         return draw_layer(self, number, layer, quantity, file)
@@ -77,22 +78,21 @@ def workspace(
     judged by that many places along each axis. Raises ModelError for a box, a spacing or a robot that does not fit, and
     where neither strokes nor a box bound the workspace.
     """
+    refine = whole("workspace", "refine", refine, least=1)
+    if spacing is not None:
+        spacing = number("workspace", "spacing", spacing, unit="m", above=0.0)
+    checked_places(places, spacing, "workspace")
     limits = limits or Limits()
     examiner = examiner_of(robot, limits)
-    bounds = _bounds(examiner) if box is None else floats(box)
-    if bounds.shape != (3, 2) or not (np.isfinite(bounds).all() and (bounds[:, 0] <= bounds[:, 1]).all()):
-        raise ModelError(
-            f"{examiner.name}: found the box {shown(bounds if box is None else box)}, expected three finite "
-            "pairs (least, largest) of x, y and z in m; give box=, or strokes of all carts in Limits"
-        )
-    checked_places(places, spacing, examiner.name)
+    bounds = _bounds(examiner) if box is None else array("workspace", "box", box, (3, 2), unit="m")
+    if not (bounds[:, 0] <= bounds[:, 1]).all():
+        found = Given("box", box)
+        raise ModelError("expected pairs (least, largest) of x, y and z in m", place="workspace", found=found)
     if places is not None:
         spacing = settled_spacing(
             places, bounds, lambda step: int(examiner(_grid(examiner.name, bounds, step)[0], R).inside.sum())
         )
     places_of_grid, axes = _grid(examiner.name, bounds, USUAL if spacing is None else spacing)
-    if not (isinstance(refine, (int, np.integer)) and refine >= 1):
-        raise ModelError(f"{examiner.name}: found refine={refine!r}, expected a whole number from 1")
     examined = examiner(places_of_grid, R)
     inside = examined.inside.reshape([len(axis) for axis in axes])
     fraction = inside.astype(float)
@@ -110,7 +110,7 @@ def workspace(
         fraction=fraction,
         limits=limits,
         rails=examiner.rails,
-        refine=int(refine),
+        refine=refine,
     )
 
 
@@ -139,8 +139,6 @@ def _grid(name: str, box: np.ndarray, spacing: float) -> tuple[np.ndarray, list[
 
 def _cells(name: str, box: np.ndarray, spacing: float) -> list[np.ndarray]:
     """Middles of cells of equal size along each axis."""
-    if not 0 < real(spacing) < np.inf:
-        raise ModelError(f"{name}: found spacing={spacing!r}, expected a length above 0 m")
     extents = box[:, 1] - box[:, 0]
     counts = np.maximum(np.ceil(extents / spacing - 1e-9), 1.0)
     if counts.prod() > _MOST:

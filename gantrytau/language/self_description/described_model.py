@@ -27,28 +27,19 @@ from gantrytau.language.declarations import (
 from gantrytau.language.events import Mode
 from gantrytau.language.self_description.placed_parts import NUMBERS, PlacedPart, in_si, number_of
 
-HEADINGS = {  # kind of a quantity -> heading, in the order in which they are told
+HEADINGS = {  # kind of a quantity or of another row -> heading, in the order in which they are told
     "parameter": "Parameters",
+    "setting": "Settings",
+    "connector": "Connectors",
     "input": "Inputs",
     "output": "Outputs",
     "real": "Variables",
     "flow": "Flows",
     "propagated": "Passed along",
     "discrete": "Discrete variables",
+    "component": "Components",
+    "outer": "Around it",
 }
-ORDER = (
-    "Parameters",
-    "Settings",
-    "Connectors",
-    "Inputs",
-    "Outputs",
-    "Variables",
-    "Flows",
-    "Passed along",
-    "Discrete variables",
-    "Components",
-    "Around it",
-)
 ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "prefer", "undetermined", "assumed")
 HIDDEN = {"drawn"}  # settings of every model
 
@@ -74,17 +65,13 @@ def _found(part: PlacedPart, name: str, title: str) -> Description:
     plain, _, index = first.partition("[")
     member = part.members.get(plain)
     if member is None:
-        raise ModelError(
-            f"describe: {part.path.rstrip('.') or title} has no '{plain}'"
-            f"{did_you_mean(plain, [*part.members, *_settings(part.kind)])}",
-            argument="name",
-        )
+        hint = did_you_mean(plain, [*part.members, *_settings(part.kind)])
+        words = f"{part.path.rstrip('.') or title} has no '{plain}'{hint}"
+        raise ModelError(words, place="describe", argument="name")
     if isinstance(member, Quantity):
         if rest:
-            raise ModelError(
-                f"describe: found '{name}', but {plain} is a {type(member).__name__}, which has no parts; ask for '{first}'",
-                argument="name",
-            )
+            words = f"{plain} is a {type(member).__name__}, which has no parts; ask for '{first}'"
+            raise ModelError(f"found '{name}', but ", words, place="describe", argument="name")
         return _of_quantity(part, plain)
     if not hasattr(member, "members") and not isinstance(member, Array):
         return Description(f"{part.path}{plain}", f"the {member.component.__name__} around it (outer)")
@@ -94,10 +81,8 @@ def _found(part: PlacedPart, name: str, title: str) -> Description:
             return _of_array(part, plain, parts)
         number = index.rstrip("]")
         if not number.isdigit() or int(number) >= len(parts):
-            raise ModelError(
-                f"describe: found {first}, expected an index from 0 to {len(parts) - 1}, as {plain}[0]",
-                argument="name",
-            )
+            words = f"found {first}, expected an index from 0 to {len(parts) - 1}, as {plain}[0]"
+            raise ModelError(words, place="describe", argument="name")
         parts = [parts[int(number)]]
     found = parts[0]
     return _found(found, rest, title) if rest else _of_part(found, f"{part.path}{first}")
@@ -108,26 +93,18 @@ def _of_part(part: PlacedPart, title: str) -> Description:
     what = "connector" if not hasattr(kind, "equations") else "model"
     words = f"{kind.__name__}, " if title != kind.__name__ else ""
     said = f"{words}{what} of {kind.__module__}" + (", an instance" if part.given and not words else "")
-    tables = sorted(
-        [*_quantities(part), *_components(part), *_settings_of(part)],
-        key=lambda rows: ORDER.index(rows.heading),
-    )
-    return Description(
-        title, said, first_sentence(kind.__doc__), (*_inherited(kind), *_in_si(part)), tuple(tables)
-    )
+    facts = (*_inherited(kind), *_in_si(part))
+    tables = [*_quantities(part), *_components(part), *_settings_of(part)]
+    tables.sort(key=lambda rows: [*HEADINGS.values()].index(rows.heading))
+    return Description(title, said, first_sentence(kind.__doc__), facts, tuple(tables))
 
 
 def _in_si(part: PlacedPart) -> Iterator[tuple[str, str]]:
     """That numbers of a model are in SI, if what is shown is not."""
-    members = [
-        m for m in part.members.values() if isinstance(m, Quantity) and m.display and m.display != m.unit
-    ]
-    if members:
-        units = dict.fromkeys(f"{m.display} for {m.unit}" for m in members)
-        yield (
-            "shown in",
-            f"{', '.join(units)}; a number that you give is in SI, or a text: '30 {members[0].display}'",
-        )
+    members = [m for m in part.members.values() if isinstance(m, Quantity)]
+    if shown := [m for m in members if m.display and m.display != m.unit]:
+        units = ", ".join(dict.fromkeys(f"{m.display} for {m.unit}" for m in shown))
+        yield "shown in", f"{units}; a number that you give is in SI, or a text: '30 {shown[0].display}'"
 
 
 def _inherited(kind: Any) -> Iterator[tuple[str, str]]:
@@ -153,9 +130,7 @@ def _quantities(part: PlacedPart) -> Iterator[Listing]:
     for kind, heading in HEADINGS.items():
         names = [name for name, m in members.items() if m.kind == kind]
         column = "value" if kind == "parameter" else "start"
-        rows = [
-            (_with_shape(members[n]), _spoken(part, n), _unit(members[n]), _words(part, n)) for n in names
-        ]
+        rows = [(_with_shape(m := members[n]), _spoken(part, n), _unit(m), _words(part, n)) for n in names]
         if rows:
             yield Listing.of(heading, ("name", column, "unit", "description"), rows)
 
@@ -175,12 +150,12 @@ def _components(part: PlacedPart) -> Iterator[Listing]:
         elif hasattr(member, "members"):
             (one,) = part.parts(name)
             heading = "Components" if hasattr(one.kind, "equations") else "Connectors"
-            given = ", ".join(f"{key}={_given(v)}" for key, v in one.modifications.items())
-            rows[heading].append((name, one.kind.__name__, cut(given, 40), first_sentence(one.kind.__doc__)))
-        else:
-            rows["Around it"].append(
-                (name, member.component.__name__, "", first_sentence(member.component.__doc__))
+            rows[heading].append(
+                (name, one.kind.__name__, _changes(one, 40), first_sentence(one.kind.__doc__))
             )
+        else:
+            kind = member.component
+            rows["Around it"].append((name, kind.__name__, "", first_sentence(kind.__doc__)))
     for heading, found in rows.items():
         if found:
             yield Listing.of(heading, ("name", "class", "with", "description"), found)
@@ -195,22 +170,12 @@ def _settings(kind: Any) -> dict[str, Any]:
 
 
 def _settings_of(part: PlacedPart) -> Iterator[Listing]:
-    rows = [
-        (name, short(part.modifications.get(name, value))) for name, value in _settings(part.kind).items()
-    ]
-    if rows:
+    if rows := [(n, short(part.modifications.get(n, v))) for n, v in _settings(part.kind).items()]:
         yield Listing.of("Settings", ("name", "value"), rows)
 
 
 def _of_array(part: PlacedPart, name: str, parts: list[PlacedPart]) -> Description:
-    rows = [
-        (
-            f"{name}[{k}]",
-            one.kind.__name__,
-            cut(", ".join(f"{key}={_given(v)}" for key, v in one.modifications.items()), 80),
-        )
-        for k, one in enumerate(parts)
-    ]
+    rows = [(f"{name}[{k}]", one.kind.__name__, _changes(one, 80)) for k, one in enumerate(parts)]
     tables = (Listing.of("Components", ("name", "class", "with"), rows),)
     return Description(f"{part.path}{name}", f"{len(parts)} components", tables=tables)
 
@@ -236,13 +201,8 @@ def _of_quantity(part: PlacedPart, name: str) -> Description:
     if modes := getattr(member, "names", None):
         rows.append(("modes", ", ".join(modes)))
     kind = f"{type(member).__name__} of {member.owner or part.kind.__name__}"
-    return Description(
-        f"{part.path}{name}",
-        kind,
-        member.description,
-        (),
-        (Listing.of("Attributes", ("name", "value"), rows),),
-    )
+    tables = (Listing.of("Attributes", ("name", "value"), rows),)
+    return Description(f"{part.path}{name}", kind, member.description, tables=tables)
 
 
 def _with_shape(member: Quantity) -> str:
@@ -270,11 +230,7 @@ def _shown(member: Quantity, value: Any) -> str:
         return _value(value)
     try:
         return _value(scale(member.display).written(np.asarray(value, dtype=float)))
-    except (
-        ModelError,
-        TypeError,
-        ValueError,
-    ):  # units that are none, values of others: what the compiler refuses
+    except (ModelError, TypeError, ValueError):  # no units, values of others: what the compiler refuses
         return f"{_value(value)} {member.unit}"
 
 
@@ -302,6 +258,10 @@ def _words(part: PlacedPart, name: str) -> str:
     return "; ".join(filter(None, [member.description, ", ".join(limits)]))
 
 
+def _changes(part: PlacedPart, length: int) -> str:
+    return cut(", ".join(f"{key}={_given(v)}" for key, v in part.modifications.items()), length)
+
+
 def _given(value: Any) -> str:
     """A modification in few letters."""
     if isinstance(value, Mapping):
@@ -318,9 +278,8 @@ def _value(value: Any) -> str:
         return cut(f"= {formula_words(value)}", 40)
     if isinstance(value, Callable) and not hasattr(value, "members"):
         return "= computed"
-    if isinstance(value, (list, tuple)) and not any(
-        isinstance(one, (Mapping, str, Formula)) for one in value
-    ):
+    words = (Mapping, str, Formula)
+    if isinstance(value, (list, tuple)) and not any(isinstance(one, words) for one in value):
         try:
             return array_words(np.asarray(value, dtype=float))
         except (TypeError, ValueError):  # of parts of several shapes, or no numbers

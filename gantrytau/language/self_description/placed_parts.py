@@ -49,7 +49,7 @@ class PlacedPart:
         """An attribute of a quantity, such as its start."""
         given = self.modifications.get(name)
         if isinstance(given, (Start, Bounds)):
-            given = {k: v for k, v in given.attributes().items() if v is not None}
+            given = given.attributes()
         member = self.members[name]
         declared = getattr(member, key, None)
         found = number_of(given.get(key, declared) if isinstance(given, Mapping) else declared, self.scope)

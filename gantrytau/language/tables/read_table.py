@@ -32,9 +32,9 @@ def read_table(path: str | Path, columns: Sequence[str] | None = None) -> tuple[
         return (x, np.array(ys)), np.column_stack(values)
     names = list(columns or read.names)
     if len(names) != 2:
-        raise ModelError(
-            f"{path}: found the columns {', '.join(names)}, expected two of a curve; name them, columns=('x', 'y')",
-            argument="columns",
+        words = (
+            f"found the columns {', '.join(names)}, expected two of a curve; name them, columns=('x', 'y')"
         )
+        raise ModelError(words, place=str(path), argument="columns")
     x, y = (read.column(name, filled=True) for name in names)
     return x, y

@@ -2,17 +2,16 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.checks import array, check_words
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Formula
 from gantrytau.language.symbols import note_range
 from gantrytau.language.tables.local_polynomials import interpolating, polynomials
-
-KINDS, WAYS = ("linear", "spline"), ("hold", "linear", "error")
 
 
 def table(
@@ -20,8 +19,8 @@ def table(
     xs: Any,
     ys: Any,
     *,
-    kind: str = "linear",
-    outside: str = "hold",
+    kind: Literal["linear", "spline"] = "linear",
+    outside: Literal["hold", "linear", "error"] = "hold",
 ) -> Any:
     """The value at x of a table of numbers, as an expression: it has derivatives, and goes into C code as it is.
 
@@ -35,32 +34,20 @@ def table(
     table ends with SolveError, which names the argument, functions are NaN there, and an FMU stops.
     ModelError for tables that do not rise, are not finite, or do not fit.
     """
-    for word, given, known in (("kind", kind, KINDS), ("outside", outside, WAYS)):
-        if given not in known:
-            raise ModelError(
-                f"table: found {word}={given!r}, expected one of {', '.join(map(repr, known))}; correct it",
-                argument=word,
-            )
+    check_words(table, locals())
     two = isinstance(x, (tuple, list)) and len(x) == 2
     arguments: tuple[Any, ...] = tuple(x) if two else (x,)
     if any(isinstance(one, Formula) for one in arguments):
-        later = partial(_later, xs=xs, ys=ys, kind=kind, outside=outside)
-        return Formula(later, *arguments)
+        return Formula(partial(_later, xs=xs, ys=ys, kind=kind, outside=outside), *arguments)
     if two:
         axes = _axes(xs)
-        values = _numbers("values", ys)
-        sizes = tuple(axis.size for axis in axes)
-        if values.shape != sizes:
-            raise ModelError(
-                f"table: found values of shape {values.shape}, expected {sizes}, a row for each number of xs and a column "
-                "for each of ys; transpose or correct them"
-            )
     else:
-        axes, values = [_axis("xs", xs)], _numbers("ys", ys)
-        if values.shape != axes[0].shape:
-            raise ModelError(
-                f"table: found {axes[0].size} numbers xs and ys of shape {values.shape}, expected as many, ({axes[0].size},)"
-            )
+        axes = [_axis("xs", xs)]
+    if isinstance(ys, (ca.SX, ca.MX)):
+        raise ModelError(
+            "table: found symbols, expected numbers; what varies with parameters is k * table(...)"
+        )
+    values = array("table", "values" if two else "ys", ys, tuple(axis.size for axis in axes))
     return _applied(lambda *at: _value(at, axes, values, kind, outside), arguments)
 
 
@@ -124,33 +111,14 @@ def _axes(given: Any) -> list[np.ndarray]:
 
 def _axis(name: str, given: Any) -> np.ndarray:
     """Numbers that rise."""
-    found = _numbers(name, given)
-    if found.ndim != 1 or found.size < 2:
-        raise ModelError(f"table: found {name} of shape {found.shape}, expected two numbers or more, (n,)")
+    found = array("table", name, given, (None,))
+    if found.size < 2:
+        raise ModelError(f"table: found {found.size} numbers {name}, expected two or more", argument=name)
     falls = np.flatnonzero(~(np.diff(found) > 0))
     if falls.size:
         k = int(falls[0])
         raise ModelError(
             f"table: found {name}[{k}] = {found[k]:.17g} and {name}[{k + 1}] = {found[k + 1]:.17g} behind it, expected "
             "numbers that rise strictly; sort the points, and leave one of two at the same place"
-        )
-    return found
-
-
-def _numbers(name: str, given: Any) -> np.ndarray:
-    try:
-        if isinstance(given, (ca.SX, ca.MX)):
-            raise TypeError
-        found = np.array(given, dtype=float)
-    except (TypeError, ValueError, NotImplementedError, RuntimeError):
-        raise ModelError(
-            f"table: found {name} that are no numbers, {str(given)[:60]}, expected an array of numbers; what varies with "
-            "parameters is an expression, such as k * table(...)"
-        ) from None
-    wrong = np.argwhere(~np.isfinite(found))
-    if wrong.size:
-        place = ", ".join(map(str, wrong[0].tolist()))
-        raise ModelError(
-            f"table: found {name}[{place}] = {found[tuple(wrong[0])]}, expected finite numbers; leave that point out"
         )
     return found

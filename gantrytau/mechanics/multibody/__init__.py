@@ -27,13 +27,7 @@ from gantrytau.mechanics.multibody.contact import (
     SurfaceContact,
 )
 from gantrytau.mechanics.multibody.elastic_peg import ElasticPegContact
-from gantrytau.mechanics.multibody.forces import (
-    FrameForce,
-    FrameTorque,
-    LineForce,
-    WorldForce,
-    WorldTorque,
-)
+from gantrytau.mechanics.multibody.forces import FrameForce, FrameTorque, LineForce, WorldForce, WorldTorque
 from gantrytau.mechanics.multibody.frames import (
     Fixed,
     FixedRotation,

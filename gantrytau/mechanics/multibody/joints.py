@@ -5,19 +5,7 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau import (
-    Parameter,
-    Real,
-    branch,
-    connect,
-    constraint,
-    cross,
-    der,
-    dot,
-    norm_2,
-    outer,
-    require,
-)
+from gantrytau import Parameter, Real, branch, connect, constraint, cross, der, dot, norm_2, outer, require
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.self_description.appearance import Ball, Cuboid, ForceArrow, Hinge, Slideway, Stick
 from gantrytau.language.statements import Branch

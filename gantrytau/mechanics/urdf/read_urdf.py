@@ -12,14 +12,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, StateSelect, connect
 from gantrytau.mechanics import rotational, translational
-from gantrytau.mechanics.multibody import (
-    Cylindrical,
-    Prismatic,
-    Revolute,
-    Spherical,
-    Universal,
-    World,
-)
+from gantrytau.mechanics.multibody import Cylindrical, Prismatic, Revolute, Spherical, Universal, World
 from gantrytau.mechanics.urdf.loop_file import Closure, LoopJoint, read_closure
 from gantrytau.mechanics.urdf.urdf_file import Placement, UrdfJoint, UrdfLink, UrdfTree, read_tree
 from gantrytau.mechanics.urdf.urdf_parts import (

@@ -17,7 +17,7 @@ from gantrytau.writing.equations_page.whole_vectors import WholeGraph
 from gantrytau.writing.equations_page.wrapping_formulas import NO_BREAK, FormulaSyntax
 from gantrytau.writing.excerpt import excerpt
 from gantrytau.writing.graph import Node
-from gantrytau.writing.instants_written import AtInstants, pieces_written
+from gantrytau.writing.instants_written import AtInstants, line_written
 from gantrytau.writing.sections import Section, origins_of, section_text
 from gantrytau.writing.subexpressions import Text, located, written, written_at
 from gantrytau.writing.syntax import ordered
@@ -202,10 +202,7 @@ class _Page:
         return [line for one in self.excerpt.instants for line in self._event(one)]
 
     def _event(self, one: AtInstants) -> list[str]:
-        shared, (says, note) = pieces_written(one, self.syntax)
-        words, note = (
-            "".join(escape(p, quote=False) if isinstance(p, str) else p.text for p in x) for x in (says, note)
-        )
+        shared, words, note = line_written(one, self.syntax, lambda text: escape(text, quote=False))
         return [_row(words, note), *(_row(f"{name} = {value}") for name, value in shared)]
 
     def _block(self, section: Section) -> str:

@@ -23,11 +23,7 @@ class Quantities:
 
     def __init__(self, dae: Translated):
         self.dae, self.flat = dae, dae.flat
-        self.all: tuple[Declared, ...] = (
-            *dae.flat.parameters,
-            *dae.flat.variables,
-            *dae.flat.propagated,
-        )
+        self.all: tuple[Declared, ...] = (*dae.flat.parameters, *dae.flat.variables, *dae.flat.propagated)
         self.anchors = {n: f"v{k}" for k, v in enumerate(self.all) for n in (v.name, *v.elements)}
         self.elements = {n: (v.name, k, len(v.elements)) for v in self.all for k, n in enumerate(v.elements)}
         self.syntax = FormulaSyntax(self.anchors, widest=NARROW)
@@ -94,9 +90,7 @@ class Quantities:
             return "" if own or told else "shapes the equations"
         groups: dict[str, list[str]] = {}
         for name in one.elements:
-            groups.setdefault(self._role(one, name), []).append(
-                escape(name.removeprefix(one.name), quote=False)
-            )
+            groups.setdefault(self._role(one, name), []).append(escape(name[len(one.name) :], quote=False))
         words = "; ".join(r if len(groups) == 1 else f"{', '.join(i)}: {r}" for r, i in groups.items() if r)
         return ", ".join(filter(None, [words, self._equal(one)]))
 

@@ -12,8 +12,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Array, Input, Model, Output, Parameter, Real, cross, dot, if_else, sqrt
-from gantrytau.border.refusal import ModelError
-from gantrytau_models.mechanisms.gantry_tau import tool_ahead_of_carts
+from gantrytau_models.mechanisms.gantry_tau import check_record, tool_ahead_of_carts
 from gantrytau_models.prototypes import Prototype
 
 ROUNDING = 1e-24  # m2, of a square whose root is then 1e-12 m: a root at zero has no derivative
@@ -26,9 +25,7 @@ class ArmGeometry(Model):
     length = Parameter(1.0, unit="m", min=0.0, description="length of the link")
     offset = Parameter([0.0, 0.0, 0.0], unit="m", description="cart at s = 0, less the joint on the plate")
     direction = Parameter(
-        [1.0, 0.0, 0.0],
-        unit="1",
-        description="axis of the guideway; its length is the transmission factor",
+        [1.0, 0.0, 0.0], unit="1", description="axis of the guideway; its length is the transmission factor"
     )
 
 
@@ -38,11 +35,7 @@ class ThreeLink(Model):
     arms = Array(ArmGeometry, 3)
 
     def __init__(self, prototype: Prototype, **modifications):
-        if not isinstance(prototype, Prototype):
-            raise ModelError(
-                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1, "
-                "of `from gantrytau_models import prototypes`"
-            )
+        check_record(prototype, type(self).__name__)
         super().__init__(self._defaults(prototype), **modifications)
 
     def _defaults(self, prototype: Prototype) -> dict:

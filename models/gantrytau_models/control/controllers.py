@@ -10,11 +10,11 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, if_else, sampled
+from gantrytau import Input, Model, Output, Parameter, Real, if_else, sampled
 from gantrytau_models.control.closed_form_kinematics import carts_behind
 from gantrytau_models.control.feedforward import Feedforward
 from gantrytau_models.control.inverse_dynamics import InverseDynamics
-from gantrytau_models.mechanisms.gantry_tau import tool_ahead_of_carts
+from gantrytau_models.mechanisms.gantry_tau import check_record, tool_ahead_of_carts
 from gantrytau_models.prototypes import Prototype
 
 
@@ -51,11 +51,7 @@ class Controller(Model):
     seen = Seen()
 
     def __init__(self, prototype: Prototype, *, start: Sequence[float] | None = None, **modifications: Any):
-        if not isinstance(prototype, Prototype):
-            raise ModelError(
-                f"{type(self).__name__}: found {prototype!r}, expected a prototype record such as prototypes.L1, "
-                "of `from gantrytau_models import prototypes`"
-            )
+        check_record(prototype, type(self).__name__)
         tool = tool_ahead_of_carts(prototype) if start is None else start
         super().__init__(self._defaults(prototype, tool), **modifications)
 

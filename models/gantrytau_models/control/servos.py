@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, require, sampled
+from gantrytau.border.checks import number, whole
 from gantrytau.mechanics.friction_laws import dahl_rate
 from gantrytau.mechanics.translational import Friction
 from gantrytau_models.mechanisms.flexible import unstretched
@@ -21,9 +22,7 @@ POLES = (0.9647, 0.9656, 0.9728)  # of (6.11), from sample to sample
 
 def _places(delay: Any) -> int:
     """Of references on their way."""
-    if isinstance(delay, bool) or not isinstance(delay, int) or delay < 0:
-        raise ModelError(f"delay: found {delay!r}, expected a whole number of samples, 0 and more")
-    return delay + 1
+    return whole("CartServo", "delay", delay, least=0) + 1
 
 
 class CartServo(Model):
@@ -120,6 +119,9 @@ def cart_servos(
     bandwidth: rad/s, of the loop of the speed, for each cart with its share of the tool: m_c + m_p |dr/dq_i|^2.
     Raises ModelError where the links do not reach r, and for poles that are not between 0 and 1.
     """
+    number("cart_servos", "bandwidth", bandwidth, unit="rad/s", above=0.0)
+    number("cart_servos", "period", period, unit="s", above=0.0)
+    whole("cart_servos", "delay", delay, least=0)
     if len(poles) != len(prototype.arms) or not all(0 < a < 1 for a in poles):
         raise ModelError(
             f"cart_servos: found poles={list(poles)}, expected {len(prototype.arms)} numbers between 0 and 1"

@@ -11,11 +11,7 @@ from gantrytau_models.leadthrough.laws import (
 )
 from gantrytau_models.leadthrough.lead_through import LeadThrough
 from gantrytau_models.leadthrough.peg_control import PegControl
-from gantrytau_models.leadthrough.peg_figures import (
-    plot_peg_forces,
-    plot_peg_orientation,
-    plot_peg_torques,
-)
+from gantrytau_models.leadthrough.peg_figures import plot_peg_forces, plot_peg_orientation, plot_peg_torques
 from gantrytau_models.leadthrough.peg_in_hole import PegInHole, peg_disturbances
 from gantrytau_models.leadthrough.peg_match import Match
 from gantrytau_models.leadthrough.peg_tool import PegHand, PegTool

@@ -1,16 +1,20 @@
 """The control of a tool that is led by hand while it is in a hole, (8.2) to (8.11) of Dressler (2012)."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, if_else, norm_2, sampled
-from gantrytau_models.leadthrough.laws import Impedance, NormalEstimate, Projection, ToolForceControl
+from gantrytau import Parameter, Real, if_else, norm_2, sampled
+from gantrytau.border.checks import check_words
+from gantrytau_models.leadthrough.laws import ToolForceControl
+from gantrytau_models.leadthrough.lead_through import HandAndTool
 
 GATES = {"force": float(np.pi), "gated": float(np.radians(10.0))}  # rad, by the name of the normal
 
+Normal = Literal["force", "gated"]
 
-class PegControl(Model):
+
+class PegControl(HandAndTool):
     """The laws of lead-through for a hole, where contact is wherever there is a force, however it points.
 
     Without contact the hand leads. In contact it does so across n, the direction of the tool's force f; along n force is
@@ -22,43 +26,17 @@ class PegControl(Model):
     walls, and is here to show it. Raises ModelError for another.
     """
 
-    period = Parameter(0.004, unit="s", min=0.0, description="sampling period")
     on = Parameter(0.25, unit="N", min=0.0, description="force above which there is contact")
     off = Parameter(0.15, unit="N", min=0.0, description="force below which there is none any more")
-    f_h = Input(3, unit="N", start=0.0, description="force of the hand on the handle, as measured")
-    f_t = Input(3, unit="N", start=0.0, description="force of the tool on the hole, as measured")
-    t_t = Input(3, unit="N.m", start=0.0, description="torque of the tool on the hole, as measured")
-    v_tool = Input(3, unit="m/s", start=0.0, description="velocity of the tool")
-    hand = Impedance(period=period)
     tool = ToolForceControl(K=[0.005] * 3, K_tau=[3.0] * 3, f_ref=0.0)
-    normal = NormalEstimate()
-    projection = Projection()
-    contact = Real(unit="1", description="1 in contact, else 0")
     touched = Real(unit="1", start=0.0, description="the contact of the sample before")
-    v = Output(3, unit="m/s", start=0.0, description="velocity for the servos, from sample to sample")
-    w = Output(3, unit="rad/s", start=0.0, description="angular velocity for the servos")
 
-    def __init__(self, normal: str = "force", **modifications: Any):
-        if normal not in GATES:
-            raise ModelError(f"PegControl: found normal={normal!r}, expected 'force' or 'gated'")
+    def __init__(self, normal: Normal = "force", **modifications: Any):
+        check_words(PegControl.__init__, locals(), "PegControl")
         super().__init__(dict(normal=dict(gate=GATES[normal])), **modifications)
 
     def equations(self):
-        hand, tool, normal, projection = self.hand, self.tool, self.normal, self.projection
+        yield from super().equations()
         enough = if_else(self.touched > 0.5, self.off, self.on)
         yield self.contact == if_else(norm_2(self.f_t) > enough, 1, 0)
-        yield normal.f == self.f_t
-        yield tool.f == self.f_t
-        yield tool.t == self.t_t
-        yield tool.n == normal.n
-        yield hand.f == self.f_h
-        yield hand.v_tool == self.v_tool
-        yield hand.passed == projection.p_h
-        yield projection.contact == self.contact
-        yield projection.n == normal.n
-        yield projection.v_h == hand.v
-        yield projection.v_t == tool.v
-        yield projection.w_t == tool.w
         yield sampled(self.touched, self.contact, period=self.period)
-        yield sampled(self.v, projection.p_h + projection.p_t, period=self.period)
-        yield sampled(self.w, projection.w, period=self.period)

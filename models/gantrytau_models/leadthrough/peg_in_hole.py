@@ -5,10 +5,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, ModelError, Real, Start, atan2, connect, cross, white_noise
+from gantrytau import Model, Real, Start, atan2, connect, cross, white_noise
+from gantrytau.border.checks import instance, number
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.mechanics import multibody
-from gantrytau_models.leadthrough.peg_control import PegControl
+from gantrytau_models.leadthrough.peg_control import Normal, PegControl
 from gantrytau_models.leadthrough.peg_match import WOODEN, Match
 from gantrytau_models.leadthrough.peg_tool import EYE_PERIOD, PegHand, PegTool
 from gantrytau_models.leadthrough.servo_and_sensors import ForceSensor
@@ -46,31 +47,16 @@ class PegInHole(Model):
     )
 
     def __init__(
-        self, match: Match = WOODEN, normal: str = "force", tilt: float = TILT, **modifications: Any
+        self, match: Match = WOODEN, normal: Normal = "force", tilt: float = TILT, **modifications: Any
     ):
-        if not isinstance(match, Match):
-            raise ModelError(
-                f"PegInHole: found match={match!r}, expected a record such as Match(clearance=2e-4)"
-            )
-        if not (isinstance(tilt, int | float | np.number) and abs(tilt) <= STEEPEST):
-            raise ModelError(
-                f"PegInHole: found tilt={tilt!r}, expected at most {STEEPEST:.2f} rad either way; is it in degrees?"
-            )
-        half = tilt / 2
+        half = number("PegInHole", "tilt", tilt, unit="rad", least=-STEEPEST, most=STEEPEST) / 2
+        instance("PegInHole", "match", match, Match, "a record such as Match(clearance=2e-4)")
+        contact = {
+            name: getattr(match, name) for name in ("length", "bending", "wall", "clearance", "depth", "mu")
+        }
+        tool = dict(q=Start([np.cos(half), 0.0, np.sin(half), 0.0]))
         super().__init__(
-            dict(
-                tool=dict(q=Start([np.cos(half), 0.0, np.sin(half), 0.0])),
-                contact=dict(
-                    length=match.length,
-                    bending=match.bending,
-                    wall=match.wall,
-                    clearance=match.clearance,
-                    depth=match.depth,
-                    mu=match.mu,
-                ),
-                control=PegControl(normal).modifications,
-            ),
-            **modifications,
+            dict(tool=tool, contact=contact, control=PegControl(normal).modifications), **modifications
         )
 
     def equations(self):

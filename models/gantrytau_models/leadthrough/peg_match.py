@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau.border.checks import number
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,10 @@ class Match:
     assumed: tuple[str, ...] = ("depth", "modulus", "clearance", "wall", "mu")
 
     def __post_init__(self):
-        for name in ("length", "edge", "depth", "modulus", "clearance", "wall"):
-            value = getattr(self, name)
-            if not (isinstance(value, int | float) and 0 < value < np.inf):
-                raise ModelError(
-                    f"Match: found {name}={value!r}, expected a finite number above zero, in SI units"
-                )
-        if not (isinstance(self.mu, int | float) and 0 <= self.mu < np.inf):
-            raise ModelError(f"Match: found mu={self.mu!r}, expected a finite number, zero or more")
+        units = dict(length="m", edge="m", depth="m", modulus="Pa", clearance="m", wall="N/m")
+        for name, unit in units.items():
+            object.__setattr__(self, name, number("Match", name, getattr(self, name), unit=unit, above=0.0))
+        number("Match", "mu", self.mu, least=0.0)
 
     @property
     def bending(self) -> float:

@@ -9,15 +9,11 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
-from gantrytau import Array, Parameter, connect, translate
-from gantrytau.language.model import merge
+from gantrytau import Parameter, connect
 from gantrytau.mechanics.multibody import Body, Bushing, FixedTranslation, TwoFrames
-from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models.mechanisms.clusters import Arm, Link
-from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
-from gantrytau_models.prototypes import Prototype
+from gantrytau_models.mechanisms.clusters import Link, arms_of
+from gantrytau_models.mechanisms.elastic_links import SixGivingLinks
 
 
 class BushedRod(TwoFrames):
@@ -83,25 +79,7 @@ class BushedLink(Link):
     rod = BushedRod(L=Link.length, m=Link.mass, axis=axis)
 
 
-class OneBushedLink(Arm):
-    """An arm of one link with elastic joints."""
-
-    links = Array(BushedLink, 1)
-
-
-class TwoBushedLinks(Arm):
-    """An arm of two links with elastic joints."""
-
-    links = Array(BushedLink, 2)
-
-
-class ThreeBushedLinks(Arm):
-    """An arm of three links with elastic joints."""
-
-    links = Array(BushedLink, 3)
-
-
-class BushedSixLinkGantryTau(SixLinkGantryTau):
+class BushedSixLinkGantryTau(SixGivingLinks):
     """The six-link robot with elastic joints at both ends of its links, driven by the actuator forces `carts[i].f`.
 
     prototype, friction: as for `SixLinkGantryTau`; r: where the tool starts, (3,) in m, without force in any joint.
@@ -109,28 +87,11 @@ class BushedSixLinkGantryTau(SixLinkGantryTau):
     states of their own. Raises InitializationError where the robot with stiff links cannot stand.
     """
 
-    arms = Array(Arm, [OneBushedLink(), TwoBushedLinks(), ThreeBushedLinks()])
+    arms = arms_of(BushedLink)
 
-    def __init__(
-        self,
-        prototype: Prototype,
-        *,
-        r: ArrayLike = (0.9, 2.7, -0.7),
-        friction: type[Friction] | None = TanhFriction,
-        **modifications: Any,
-    ):
-        stiff = translate(SixLinkGantryTau(prototype, friction=None)).evaluate({"tool.r": r})
-        starts = dict(
-            arms=[
-                dict(
-                    rail=dict(s=dict(start=stiff[f"arms[{i}].rail.s"])),
-                    links=[_placed(stiff, f"arms[{i}].links[{j}].rod") for j in range(i + 1)],
-                )
-                for i in range(3)
-            ],
-            tool=dict(r=dict(start=list(stiff["tool.r"])), q=dict(start=list(stiff["tool.q"]))),
-        )
-        super().__init__(prototype, friction=friction, **merge(starts, modifications))
+    def _start(self, stiff: Mapping[str, Any], i: int) -> dict[str, Any]:
+        links = [_placed(stiff, f"arms[{i}].links[{j}].rod") for j in range(i + 1)]
+        return super()._start(stiff, i) | dict(links=links)
 
 
 def _placed(stiff: Mapping[str, Any], rod: str) -> dict[str, Any]:

@@ -86,6 +86,13 @@ class ThreeLinks(Arm):
     links = Array(Link, 3)
 
 
+def arms_of(link: type[Link]) -> Array:
+    """Arms of one, two and three links of a kind."""
+    name = link.__name__
+    kinds = {f"One{name}": 1, f"Two{name}s": 2, f"Three{name}s": 3}
+    return Array(Arm, [type(kind, (Arm,), {"links": Array(link, count)})() for kind, count in kinds.items()])
+
+
 def arm_of_rods(arm: int, count: int, turntables: Sequence[int] = ()) -> RodArm:
     """What `rods()` says of an arm of so many links, with turntables under them, from the cart outwards."""
     name = f"arms[{arm}]"

@@ -87,9 +87,7 @@ class Arm(Model):
     turn = FixedRotation(n=[0.0, 0.0, 1.0], phi=azimuth)
     base = FixedTranslation(r=lambda self: ca.vertcat(self.base_radius, 0, 0))
     shoulder = Revolute(
-        n=[0.0, 1.0, 0.0],
-        phi=dict(prefer=StateSelect.DEFAULT),
-        w=dict(prefer=StateSelect.DEFAULT),
+        n=[0.0, 1.0, 0.0], phi=dict(prefer=StateSelect.DEFAULT), w=dict(prefer=StateSelect.DEFAULT)
     )
     body = Body(m=mass, r_cm=r_cm, J=J)
     upper = FixedTranslation(r=lambda self: ca.vertcat(self.length, 0, 0))

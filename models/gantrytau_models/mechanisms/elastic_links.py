@@ -4,14 +4,15 @@ The joints of a link and its tube give way one after the other. Links and joints
 found to be, whose compliance sits in levers, carts, guideways and frame: see `FlexibleGantryTau` for that.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from gantrytau import Array, Parameter, translate
+from gantrytau import Parameter, translate
 from gantrytau.language.model import merge
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models.mechanisms.clusters import Arm, Link
+from gantrytau_models.mechanisms.clusters import Link, arms_of
 from gantrytau_models.mechanisms.flexible import ElasticRod
 from gantrytau_models.mechanisms.six_link import SixLinkGantryTau
 from gantrytau_models.prototypes import Prototype
@@ -31,33 +32,8 @@ class ElasticLink(Link):
     )
 
 
-class OneElasticLink(Arm):
-    """An arm of one elastic link."""
-
-    links = Array(ElasticLink, 1)
-
-
-class TwoElasticLinks(Arm):
-    """An arm of two elastic links."""
-
-    links = Array(ElasticLink, 2)
-
-
-class ThreeElasticLinks(Arm):
-    """An arm of three elastic links."""
-
-    links = Array(ElasticLink, 3)
-
-
-class ElasticSixLinkGantryTau(SixLinkGantryTau):
-    """The six-link robot with elastic links and joints, driven by the actuator forces `carts[i].f`.
-
-    prototype, friction: as for `SixLinkGantryTau`; r: where the tool starts, (3,) in m, with no link stretched.
-    `arms[i].links[j].c_joint`, `.c_tube` and `.d` are stiffness and damping. Carts and plate have states of their own.
-    Raises InitializationError where the robot with stiff links cannot stand.
-    """
-
-    arms = Array(Arm, [OneElasticLink(), TwoElasticLinks(), ThreeElasticLinks()])
+class SixGivingLinks(SixLinkGantryTau):
+    """Base of six-link robots whose links give way: it starts where the robot with stiff links has its tool at r."""
 
     def __init__(
         self,
@@ -67,10 +43,24 @@ class ElasticSixLinkGantryTau(SixLinkGantryTau):
         friction: type[Friction] | None = TanhFriction,
         **modifications: Any,
     ):
-        # the stiff robot tells where carts and plate are when no link is stretched
         stiff = translate(SixLinkGantryTau(prototype, friction=None)).evaluate({"tool.r": r})
         starts = dict(
-            arms=[dict(rail=dict(s=dict(start=stiff[f"arms[{i}].rail.s"]))) for i in range(3)],
+            arms=[self._start(stiff, i) for i in range(3)],
             tool=dict(r=dict(start=list(stiff["tool.r"])), q=dict(start=list(stiff["tool.q"]))),
         )
         super().__init__(prototype, friction=friction, **merge(starts, modifications))
+
+    def _start(self, stiff: Mapping[str, Any], i: int) -> dict[str, Any]:
+        """Modifications of an arm that stands where the stiff one does."""
+        return dict(rail=dict(s=dict(start=stiff[f"arms[{i}].rail.s"])))
+
+
+class ElasticSixLinkGantryTau(SixGivingLinks):
+    """The six-link robot with elastic links and joints, driven by the actuator forces `carts[i].f`.
+
+    prototype, friction: as for `SixLinkGantryTau`; r: where the tool starts, (3,) in m, with no link stretched.
+    `arms[i].links[j].c_joint`, `.c_tube` and `.d` are stiffness and damping. Carts and plate have states of their own.
+    Raises InitializationError where the robot with stiff links cannot stand.
+    """
+
+    arms = arms_of(ElasticLink)

@@ -11,14 +11,13 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, branch, connect
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.self_description.appearance import ForceArrow
 from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames, World
 from gantrytau.mechanics.multibody.orientation import of_quaternion
 from gantrytau.mechanics.rotational import Torque
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, ThreeLinks, TwoLinks, arm_of_rods
-from gantrytau_models.mechanisms.gantry_tau import Cart, WrongRecord, driven_carts, in_words
+from gantrytau_models.mechanisms.gantry_tau import Cart, check_record, driven_carts, forces_on_carts
 from gantrytau_models.mechanisms.six_link import Plate, quaternion
 from gantrytau_models.prototypes import RotatingArm, RotatingPrototype
 
@@ -144,11 +143,7 @@ class F1GantryTau(Model):
         yield connect(q6.frame_b, three.frame_links)
 
     def shapes(self):
-        for i in range(3):
-            arm, cart = f"arms[{i}]", f"carts[{i}]"
-            yield ForceArrow(
-                owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"{arm}.direction"
-            )
+        yield from forces_on_carts()
 
     def rods(self) -> Rods:
         """The links and the turntables that carry them. Where the joint on cart 1 (4.20) and the turntables on carts 2 and 3
@@ -160,10 +155,7 @@ class F1GantryTau(Model):
 
 
 def _check_prototype(prototype: RotatingPrototype, robot: str) -> None:
-    if not isinstance(prototype, RotatingPrototype):
-        raise WrongRecord(
-            f"{robot}: found {in_words(prototype)}, expected a record with turntables such as prototypes.F1"
-        )
+    check_record(prototype, robot, RotatingPrototype)
     found = tuple((len(arm.turntables), len(arm.links)) for arm in prototype.arms)
     if found != STRUCTURE:
         raise ModelError(

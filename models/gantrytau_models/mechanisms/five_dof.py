@@ -6,25 +6,24 @@ side the plate moves as that of the six-link robot does; apart they turn it abou
 
 from typing import Any
 
-from gantrytau import Array, Model, StateSelect, connect
-from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, Stick
-from gantrytau.mechanics.multibody import World
+from gantrytau import Array, StateSelect
 from gantrytau.mechanics.translational import Friction, TanhFriction
 from gantrytau_models.mechanisms.clusters import Arm, TwoLinks
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts
-from gantrytau_models.mechanisms.six_link import SEAT, Plate, links_on_guideway, plate_of, refuse_other_links
+from gantrytau_models.mechanisms.six_link import (
+    Plate,
+    PlateOnLinks,
+    links_on_guideway,
+    plate_of,
+    refuse_other_links,
+)
 from gantrytau_models.prototypes import Prototype
 
-CARTS = (
-    (0, (0,)),
-    (1, (0,)),
-    (2, (0, 1)),
-    (1, (1,)),
-    (2, (2,)),
-)  # guideway of each cart, and the links on it
+# guideway of each cart, and the links on it
+CARTS = ((0, (0,)), (1, (0,)), (2, (0, 1)), (1, (1,)), (2, (2,)))
 
 
-class FiveDofGantryTau(Model):
+class FiveDofGantryTau(PlateOnLinks):
     """A Gantry-Tau robot with five carts, driven by the actuator forces `carts[i].f`.
 
     prototype: a record such as `prototypes.L1` with links; friction: the class of friction of the carts, or None. Carts 0
@@ -33,13 +32,9 @@ class FiveDofGantryTau(Model):
     the plate is `tool.r`, `tool.R`; of its orientation two angles can be chosen, the third follows.
     """
 
-    world = World()
     arms = Array(Arm, [Arm(), Arm(), TwoLinks(), Arm(), Arm()])
     carts = Array(Cart, 5)
-    tool = Plate(
-        r=dict(prefer=StateSelect.PREFER),
-        v=dict(prefer=StateSelect.PREFER),
-    )
+    tool = Plate(r=dict(prefer=StateSelect.PREFER), v=dict(prefer=StateSelect.PREFER))
 
     def __init__(
         self, prototype: Prototype, *, friction: type[Friction] | None = TanhFriction, **modifications: Any
@@ -54,19 +49,3 @@ class FiveDofGantryTau(Model):
             tool=plate_of(prototype),
         )
         super().__init__(defaults, **modifications)
-
-    def equations(self):
-        for arm, cart in zip(self.arms, self.carts, strict=True):
-            yield connect(self.world.frame_b, arm.frame_a)
-            yield connect(arm.frame_cart, cart.frame)
-            yield connect(arm.frame_cart, arm.frame_links)
-            yield connect(arm.axis, cart.axis)
-            yield connect(arm.frame_b, self.tool.frame_a)
-
-    def shapes(self):
-        for i, (_, links) in enumerate(CARTS):
-            arm, cart, seat = f"arms[{i}]", f"carts[{i}]", f"arms[{i}].{SEAT}"
-            yield Cuboid(owner=cart, at=seat, size=6.0, R=f"{arm}.frame_cart.R")
-            yield ForceArrow(owner=cart, at=seat, force=f"{cart}.f", direction=f"{arm}.direction")
-            for j in range(1, len(links)):
-                yield Stick(owner=cart, a=seat, b=f"{arm}.links[{j}].on_cart.frame_b.r")

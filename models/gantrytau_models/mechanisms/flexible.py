@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import Array, Model, Parameter, Real, connect, der, dot, norm_2, outer, require
+from gantrytau.border.checks import array
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.self_description.appearance import Ball, ForceArrow, Slideway, Stick
-from gantrytau.mechanics.multibody import FixedTranslation, Frame, PointMass, Prismatic, TwoFrames, World
-from gantrytau.mechanics.translational import Fixed, Flange, Friction, SpringDamper, TanhFriction
-from gantrytau_models.mechanisms.gantry_tau import Cart, Tool, WrongRecord, driven_carts, in_words
+from gantrytau.language.self_description.appearance import Ball, ForceArrow, Stick
+from gantrytau.mechanics.multibody import Frame, PointMass, Prismatic, TwoFrames, World
+from gantrytau.mechanics.translational import Fixed, Friction, SpringDamper, TanhFriction
+from gantrytau_models.mechanisms.gantry_tau import Arm, Cart, Tool, check_record, driven_carts
 from gantrytau_models.prototypes import FlexiblePrototype, Prototype
 
 
@@ -53,33 +54,16 @@ class ElasticRod(TwoFrames):
         yield Ball(at="frame_b.r")
 
 
-class ElasticArm(Model):
+class ElasticArm(Arm):
     """Guideway and elastic link of one arm: frame_a on the robot's frame, frame_b at the tool."""
 
-    length = Parameter(unit="m", min=0.0, description="length of the link without force")
-    offset = Parameter(shape=3, unit="m", description="cart at s = 0, less the joint on the plate (4.7)")
-    direction = Parameter(shape=3, unit="1", description="axis of the guideway; its length is the factor")
-    link_mass = Parameter(0.0, unit="kg", min=0.0, description="mass of the link")
     c = Parameter(unit="N/m", min=0.0, description="stiffness of lever, cart and link, along the link")
     d = Parameter(unit="N.s/m", min=0.0, description="damping along the link")
-    frame_a = Frame()
-    frame_cart = Frame()
-    frame_b = Frame()
-    base = FixedTranslation(r=offset, drawn=False)
-    rail = Prismatic(n=direction, e=direction, drawn=False)
-    link = ElasticRod(L=length, m=link_mass, c=c, d=d)
-    axis = Flange()
-
-    def equations(self):
-        yield connect(self.frame_a, self.base.frame_a)
-        yield connect(self.base.frame_b, self.rail.frame_a)
-        yield connect(self.rail.frame_b, self.frame_cart)
-        yield connect(self.frame_cart, self.link.frame_a)
-        yield connect(self.link.frame_b, self.frame_b)
-        yield connect(self.rail.axis, self.axis)
+    rail = Prismatic(n=Arm.direction, e=Arm.direction, drawn=False)
+    link = ElasticRod(L=Arm.length, m=Arm.link_mass, c=c, d=d)
 
     def shapes(self):
-        yield Slideway(at="rail.frame_a.r", direction="direction", coordinate="rail.s", R="frame_a.R")
+        yield from super().shapes()
         yield ForceArrow(at="frame_cart.r", force="rail.f", direction="direction")
 
 
@@ -155,13 +139,9 @@ class FlexibleGantryTau(Model):
         friction: type[Friction] | None = TanhFriction,
         **modifications: Any,
     ):
-        if not isinstance(prototype, FlexiblePrototype):
-            raise WrongRecord(
-                f"{type(self).__name__}: found {in_words(prototype)}, expected a record with stiffness such as "
-                "prototypes.L1_flexible"
-            )
+        check_record(prototype, type(self).__name__, FlexiblePrototype)
         carts = driven_carts(prototype, friction, type(self).__name__)
-        start = np.asarray(r, dtype=float)
+        start = array("FlexibleGantryTau", "r", r, (3,), unit="m")
         positions = unstretched(prototype, start)
         defaults = dict(
             plate_mass=prototype.plate_mass,
@@ -202,8 +182,7 @@ def unstretched(prototype: Prototype, r: np.ndarray) -> np.ndarray:
 
     Raises ModelError for a tool that a link does not reach.
     """
-    if r.shape != (3,) or not np.all(np.isfinite(r)):
-        raise ModelError(f"FlexibleGantryTau: found r={r.tolist()}, expected three finite numbers in m")
+    r = array("FlexibleGantryTau", "r", r, (3,), unit="m")
     positions = []
     for i, arm in enumerate(prototype.arms):
         away, along = r - np.array(arm.offset), np.array(arm.direction)

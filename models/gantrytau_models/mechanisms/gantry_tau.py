@@ -5,13 +5,14 @@ between the cart and the tool; that the plate keeps its orientation is modelled 
 prismatic joints in series.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from gantrytau import Array, Input, Model, Parameter, Real, StateSelect, connect, der, outer
-from gantrytau.border.refusal import ModelError
-from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Slideway
+from gantrytau.border.refusal import ModelError, short
+from gantrytau.language.self_description.appearance import Cuboid, ForceArrow, PathLine, Shape, Slideway
 from gantrytau.language.self_description.rods import RodArm, Rods, SingleRod
 from gantrytau.mechanics.multibody import (
     FixedTranslation,
@@ -22,7 +23,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.translational import Flange, Force, Friction, Frictionless, TanhFriction
-from gantrytau_models.prototypes import Prototype, RotatingPrototype
+from gantrytau_models.prototypes import FlexiblePrototype, Prototype, RotatingPrototype
 
 
 class Arm(Model):
@@ -58,7 +59,7 @@ class Arm(Model):
         yield connect(self.link.frame_b, self.frame_b)
         yield connect(self.rail.axis, self.axis)
 
-    def shapes(self):
+    def shapes(self) -> Iterator[Shape]:
         yield Slideway(at="rail.frame_a.r", direction="direction", coordinate="rail.s", R="frame_a.R")
 
 
@@ -155,11 +156,7 @@ class GantryTau(Model):
             yield connect(arm.frame_b, self.tool.frame)
 
     def shapes(self):
-        for i in range(3):
-            arm, cart = f"arms[{i}]", f"carts[{i}]"
-            yield ForceArrow(
-                owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"{arm}.direction"
-            )
+        yield from forces_on_carts()
 
     def rods(self) -> Rods:
         """The links, one on each arm: their joints on the plate are in its tool point, as offsets say (4.7)."""
@@ -169,17 +166,44 @@ class GantryTau(Model):
         )
 
 
+def forces_on_carts() -> Iterator[ForceArrow]:
+    """The actuator forces on three carts, as pictures show them."""
+    for i in range(3):
+        cart = f"carts[{i}]"
+        yield ForceArrow(
+            owner=cart, at=f"{cart}.frame.r", force=f"{cart}.f", direction=f"arms[{i}].direction"
+        )
+
+
 class WrongRecord(ModelError, TypeError):
     """What a robot was given is no record that describes it, or no class of friction."""
 
 
-def in_words(found: Any) -> str:
-    """A record, or what was given in place of one, by its name: whole it is a page long."""
-    return f"{type(found).__name__}(name={found.name!r})" if hasattr(found, "name") else repr(found)
-
-
 def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Friction:
     return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
+
+
+# a record of each kind that robots are made of
+EXAMPLES = {
+    Prototype: "prototypes.L1",
+    RotatingPrototype: "prototypes.F1",
+    FlexiblePrototype: "prototypes.L1_flexible",
+}
+
+
+def check_record(prototype: Any, robot: str, kind: type = Prototype) -> None:
+    """ModelError for what does not describe a robot of that kind."""
+    if not isinstance(prototype, kind):
+        found = (
+            f"{type(prototype).__name__}(name={prototype.name!r})"
+            if hasattr(prototype, "name")
+            else short(prototype)
+        )
+        raise WrongRecord(
+            f"found {found}, expected a {kind.__name__} such as {EXAMPLES[kind]}; from gantrytau_models import prototypes",
+            place=robot,
+            argument="prototype",
+        )
 
 
 def driven_carts(
@@ -189,11 +213,7 @@ def driven_carts(
     record: type = Prototype,
 ) -> list[dict]:
     """Modifications of the carts of a robot; ModelError for what is no such record or no friction."""
-    if not isinstance(prototype, record):
-        raise WrongRecord(
-            f"{robot}: found {in_words(prototype)}, expected a prototype record such as prototypes.L1, "
-            "of `from gantrytau_models import prototypes`"
-        )
+    check_record(prototype, robot, record)
     if friction is not None and not (isinstance(friction, type) and issubclass(friction, Friction)):
         raise WrongRecord(
             f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"

@@ -37,7 +37,33 @@ class Plate(Body):
         yield Triad(at="r", R="R")
 
 
-class SixLinkGantryTau(Model):
+class PlateOnLinks(Model):
+    """A plate on links, arm by arm, each with a cart on its guideway."""
+
+    world = World()
+    arms: Array
+    carts: Array
+    tool: Plate
+
+    def equations(self):
+        for arm, cart in zip(self.arms, self.carts, strict=True):
+            yield connect(self.world.frame_b, arm.frame_a)
+            yield connect(arm.frame_cart, cart.frame)
+            yield connect(arm.frame_cart, arm.frame_links)
+            yield connect(arm.axis, cart.axis)
+            yield connect(arm.frame_b, self.tool.frame_a)
+
+    def shapes(self):
+        # offsets of the links are from the origin: carts are shown where their joints are
+        for i, each in enumerate(self.arms):
+            arm, cart, seat = f"arms[{i}]", f"carts[{i}]", f"arms[{i}].{SEAT}"
+            yield Cuboid(owner=cart, at=seat, size=6.0, R=f"{arm}.frame_cart.R")
+            yield ForceArrow(owner=cart, at=seat, force=f"{cart}.f", direction=f"{arm}.direction")
+            for j in range(1, len(each.links)):
+                yield Stick(owner=cart, a=seat, b=f"{arm}.links[{j}].on_cart.frame_b.r")
+
+
+class SixLinkGantryTau(PlateOnLinks):
     """The six-link Gantry-Tau robot, driven by the actuator forces `carts[i].f`.
 
     prototype: a record such as `prototypes.L1` with links; friction: the class of friction of the carts, or
@@ -45,7 +71,6 @@ class SixLinkGantryTau(Model):
     lengths and offsets are the parameters `arms[i].links[j].length`, `.offset`, `.plate_offset`.
     """
 
-    world = World()
     arms = Array(Arm, [Arm(), TwoLinks(), ThreeLinks()])
     carts = Array(Cart, 3)
     tool = Plate(r=dict(prefer=StateSelect.PREFER), v=dict(prefer=StateSelect.PREFER))
@@ -62,23 +87,6 @@ class SixLinkGantryTau(Model):
             tool=plate_of(prototype),
         )
         super().__init__(defaults, **modifications)
-
-    def equations(self):
-        for arm, cart in zip(self.arms, self.carts, strict=True):
-            yield connect(self.world.frame_b, arm.frame_a)
-            yield connect(arm.frame_cart, cart.frame)
-            yield connect(arm.frame_cart, arm.frame_links)
-            yield connect(arm.axis, cart.axis)
-            yield connect(arm.frame_b, self.tool.frame_a)
-
-    def shapes(self):
-        # offsets of the links are from the origin: carts are shown where their joints are
-        for i in range(3):
-            arm, cart, seat = f"arms[{i}]", f"carts[{i}]", f"arms[{i}].{SEAT}"
-            yield Cuboid(owner=cart, at=seat, size=6.0, R=f"{arm}.frame_cart.R")
-            yield ForceArrow(owner=cart, at=seat, force=f"{cart}.f", direction=f"{arm}.direction")
-            for j in range(1, i + 1):
-                yield Stick(owner=cart, a=seat, b=f"{arm}.links[{j}].on_cart.frame_b.r")
 
     def rods(self) -> Rods:
         """The links; joints on a cart have places of their own, so that of the cart is given (4.14)."""

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Array, Input, Model, ModelError, Parameter, Real, StateSelect, connect, cross, der
+from gantrytau.border.checks import array
 from gantrytau.mechanics.multibody import (
     Body,
     FixedTranslation,
@@ -125,9 +126,9 @@ class StewartPlatform(Model):
         # the pairs on the platform stand between those on the base, and a leg goes to the nearer one
         below = pairs_of_joints(0.6, 0.2) if base_joints is None else base_joints
         above = pairs_of_joints(0.3, 0.2, np.pi / 3)[PAIRING] if platform_joints is None else platform_joints
-        below = _numbers(model, "base_joints", below, (6, 3))
-        above = _numbers(model, "platform_joints", above, (6, 3))
-        home = _numbers(model, "home", home, (3,))
+        below = array(model, "base_joints", below, (6, 3), unit="m")
+        above = array(model, "platform_joints", above, (6, 3), unit="m")
+        home = array(model, "home", home, (3,), unit="m")
         legs = [_leg(model, k, a, b, home + b - a) for k, (a, b) in enumerate(zip(below, above, strict=True))]
         r, R = _starting_pose(modifications.get("platform"), home)
         for leg, length in zip(legs, np.linalg.norm(r + above @ R.T - below, axis=1), strict=True):
@@ -148,16 +149,6 @@ def pairs_of_joints(radius: float, half: float, turn: float = 0.0) -> np.ndarray
     """
     angles = turn + np.repeat([0.0, 2 * np.pi / 3, 4 * np.pi / 3], 2) + np.tile([-half, half], 3)
     return radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
-
-
-def _numbers(model: str, name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    try:
-        found = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(f"{model}: {name} is {value!r}, expected numbers of shape {shape}, in m") from None
-    if found.shape != shape:
-        raise ModelError(f"{model}: {name} has shape {found.shape}, expected {shape}: x, y, z in m")
-    return found
 
 
 def _leg(model: str, number: int, below: np.ndarray, above: np.ndarray, way: np.ndarray) -> dict[str, Any]:

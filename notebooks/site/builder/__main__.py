@@ -11,6 +11,7 @@ from notebooks.site.builder.executed_notebooks import executed_notebooks
 from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import error_pages
 from notebooks.site.builder.generated.reference_pages import reference_pages
+from notebooks.site.builder.generated.source_page import source_page
 from notebooks.site.builder.generated.thesis_page import thesis_page
 from notebooks.site.builder.places import BUILD, NOTEBOOKS, SITE, SOURCES, STAGE
 from notebooks.site.builder.staging import Stage, stage_handwritten
@@ -26,7 +27,11 @@ def main() -> int:
     begin = time.monotonic()
     stage = Stage()
     stage_handwritten(stage)
-    single = {"thesis/index.md": thesis_page(), "command_line/index.md": command_page()}
+    single = {
+        "thesis/index.md": thesis_page(),
+        "command_line/index.md": command_page(),
+        "sources/index.md": source_page(),
+    }
     for page, text in (*reference_pages(), *error_pages(), *single.items()):
         stage.write(page, text)
     told(begin, f"{len(stage.written)} pages staged; notebooks are executed")

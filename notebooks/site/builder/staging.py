@@ -30,7 +30,13 @@ MANUAL = {  # page of a folder -> page of the site
     "CHANGELOG.md": "manual/changelog.md",
 }
 UNSEARCHED = {"manual/changelog.md"}  # names everything, and explains nothing
-GENERATED = ("reference", "messages", "thesis", "command_line")  # folders of pages that nobody writes
+GENERATED = (
+    "reference",
+    "messages",
+    "thesis",
+    "command_line",
+    "sources",
+)  # folders of pages that nobody writes
 LINK = re.compile(  # or code, in which nothing is one
     r"^```.*?^```|(!?\[(?:`[^`\n]*`|[^\]`])*\]\()([^)\s]+)(\))|`[^`\n]+`", re.MULTILINE | re.DOTALL
 )

@@ -7,6 +7,8 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import check_words, instance
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.diagnostics.acceptance import (
@@ -15,17 +17,17 @@ from gantrytau_optimica.calibration.diagnostics.acceptance import (
     check_count,
     frame_seen,
     in_frame,
-    in_words,
     judged,
     not_in_base,
+    other_frame,
     usable_rows,
 )
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.plausibility import Fitting, Misses, check_robot, misses_of
 from gantrytau_optimica.calibration.fitting.constraints import read_constraints
 from gantrytau_optimica.calibration.fitting.model_fits import fit_model
-from gantrytau_optimica.calibration.fitting.rod_fit import Fit, Prior
-from gantrytau_optimica.calibration.links.arm_closure import arms_of
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit
+from gantrytau_optimica.calibration.links.arm_closure import Orientation, arms_of
 from gantrytau_optimica.calibration.links.error_models import (
     check_model,
     links_of_arms,
@@ -38,21 +40,30 @@ from gantrytau_optimica.calibration.named.calibrate_by_names import calibrate_by
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
 from gantrytau_optimica.fitting.finding import Finding
 
+ErrorModel = Literal["parallel", 1, 2, 3, 4, 5]
+Method = Literal["gauss-newton", "ipopt"]
+Start = Literal["nominal", "linear"]
+Loss = Literal["linear", "robust"]
+Frame = Literal["fitted", "base"]
+ON_RODS = dict(
+    model=None, method="gauss-newton", start="nominal", orientation="local"
+)  # else robots on rods are meant
+
 
 @overload
 def calibrate(
     robot: Model,
     measurements: Measurements,
     *,
-    model: Literal["parallel", 1, 2, 3, 4, 5] | None = ...,
-    method: Literal["gauss-newton", "ipopt"] = ...,
-    start: Literal["nominal", "linear"] = ...,
-    orientation: Literal["local", "unit", "free"] = ...,
+    model: ErrorModel | None = ...,
+    method: Method = ...,
+    start: Start = ...,
+    orientation: Orientation = ...,
     prior: Mapping[str, Any] | None = ...,
-    loss: Literal["linear", "robust"] = ...,
+    loss: Loss = ...,
     holdout: Any = ...,
     constraints: Mapping[str, Any] | None = ...,
-    frame: Literal["fitted", "base"] = ...,
+    frame: Frame = ...,
 ) -> Calibration: ...
 
 
@@ -64,9 +75,9 @@ def calibrate(
     parameters: Sequence[str],
     joints: Sequence[str] | None = ...,
     prior: Mapping[str, Any] | None = ...,
-    loss: Literal["linear", "robust"] = ...,
+    loss: Loss = ...,
     holdout: Any = ...,
-    frame: Literal["fitted", "base"] = ...,
+    frame: Frame = ...,
 ) -> NamedCalibration: ...
 
 
@@ -74,15 +85,15 @@ def calibrate(
     robot: Model,
     measurements: Measurements,
     *,
-    model: Literal["parallel", 1, 2, 3, 4, 5] | None = None,
-    method: Literal["gauss-newton", "ipopt"] = "gauss-newton",
-    start: Literal["nominal", "linear"] = "nominal",
-    orientation: Literal["local", "unit", "free"] = "local",
+    model: ErrorModel | None = None,
+    method: Method = "gauss-newton",
+    start: Start = "nominal",
+    orientation: Orientation = "local",
     prior: Mapping[str, Any] | None = None,
-    loss: Literal["linear", "robust"] = "linear",
+    loss: Loss = "linear",
     holdout: Any = "second",
     constraints: Mapping[str, Any] | None = None,
-    frame: Literal["fitted", "base"] = "fitted",
+    frame: Frame = "fitted",
     parameters: Sequence[str] | None = None,
     joints: Sequence[str] | None = None,
 ) -> Calibration | NamedCalibration:
@@ -104,18 +115,16 @@ def calibrate(
     frame is fitted beside them. joints: columns of q, by default those that are driven.
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
-    if not isinstance(measurements, Measurements):
-        raise ModelError(
-            f"calibrate: found {type(measurements).__name__} as measurements, expected Measurements(q, r, ...)"
-        )
-    words = dict(method=method, start=start, orientation=orientation, loss=loss, frame=frame)
-    _check_words(constraints, parameters is not None, model, words)
+    asked = locals()
+    check_words(calibrate, asked)
+    instance("calibrate", "measurements", measurements, Measurements, "Measurements(q, r, ...)")
+    _check_rods(asked)
     if parameters is not None:
         known = usable(robot, measurements, parameters, joints)
         split = _split(known.rows, holdout, measurements)
         return calibrate_by_names(robot, measurements, known, split, prior=prior, loss=loss, frame=frame)
-    asked = _Asked(model, start, prior, loss, orientation, frame)
-    return _on_rods(read_nominal(robot), measurements, asked, method, holdout, constraints)
+    fit = _Asked(model, start, prior, loss, orientation, frame)
+    return _on_rods(read_nominal(robot), measurements, fit, method, holdout, constraints)
 
 
 def _on_rods(
@@ -133,7 +142,10 @@ def _on_rods(
     check_carts(nominal_rods, measurements, rows)
     fitted, held_out = _split(rows, holdout, measurements)
     fits, known, there = _fitted(nominal_rods, measurements.select(fitted), asked, (rows, fitted, findings))
-    fits = fits if method == "gauss-newton" else _by_ipopt(fits, constraints)
+    if method == "ipopt":
+        from gantrytau_optimica.calibration.fitting.ipopt_fit import solve
+
+        fits = solve(fits, constraints)
     found = Calibration(
         nominal_rods=nominal_rods,
         measurements=measurements,
@@ -150,14 +162,8 @@ def _on_rods(
     )
     if constraints:
         found = replace(found, constraints=tuple(read_constraints(constraints, found.names)))
-    told = [] if there is None or asked.start == "linear" else [in_words(there, rows)]
+    told = [] if there is None or asked.start == "linear" else [other_frame(there, rows)]
     return found.with_findings([*findings, *told, *judged(found)])
-
-
-def _by_ipopt(fits: list[Fit], constraints: Mapping[str, Any] | None) -> list[Fit]:
-    from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
-
-    return solve_constrained(fits, constraints) if constraints else [solve(fit) for fit in fits]
 
 
 @dataclass(frozen=True)
@@ -203,7 +209,9 @@ def _fitted(
         raise not_in_base(robot, there, rows)
     directions = asked.start if there is None else "linear"
     values = {n: float(x) for link in nominal for n, x in zip(link.names, link.start, strict=True)}
-    fits = fit_model(asked.model, links, data, directions, Prior(asked.prior, values), asked.loss)
+    fits = fit_model(
+        asked.model, links, data, start=directions, prior=asked.prior, nominal=values, loss=asked.loss
+    )
     return fits, misses_of(nominal) if asked.start == "nominal" else None, there
 
 
@@ -212,34 +220,26 @@ def _needs_values(prior: Mapping[str, Any] | None) -> bool:
     return isinstance(prior, Mapping) and any(not isinstance(given, tuple) for given in prior.values())
 
 
-def _check_words(
-    constraints: Mapping[str, Any] | None, by_names: bool, model: Any, words: Mapping[str, str]
-) -> None:
-    """ModelError for words that are not known, or speak of rods beside parameters=."""
-    known = dict(
-        method=("gauss-newton", "ipopt"),
-        start=("nominal", "linear"),
-        orientation=("local", "unit", "free"),
-        loss=("linear", "robust"),
-        frame=("fitted", "base"),
-    )
-    for name, word in words.items():
-        if word not in known[name]:
+def _check_rods(asked: Mapping[str, Any]) -> None:
+    """ModelError for arguments that speak of robots on rods beside parameters=, and constraints that are not kept."""
+    for name, usual in ON_RODS.items() if asked["parameters"] is not None else ():
+        if asked[name] != usual:
             raise ModelError(
-                f"calibrate: found {name}={word!r}, expected {' or '.join(map(repr, known[name]))}",
-                argument=name,
+                f"expected {usual!r} with ",
+                Given("parameters"),
+                ": it speaks of robots on rods",
+                place="calibrate",
+                found=Given(name, asked[name]),
             )
-    usual = dict(method="gauss-newton", start="nominal", orientation="local", model=None)
-    for name, word in usual.items() if by_names else ():
-        found = words.get(name, model)
-        if found != word:
-            raise ModelError(
-                f"calibrate: found {name}={found!r} with parameters=, expected {word!r}: it speaks of robots on rods",
-                argument=name,
-            )
-    if constraints and words["method"] != "ipopt":
+    if asked["constraints"] and asked["method"] != "ipopt":
         raise ModelError(
-            "calibrate: found constraints= with method='gauss-newton', which keeps none; take method='ipopt'",
+            Given("constraints"),
+            " with ",
+            Given("method", asked["method"]),
+            ", expected ",
+            Given("method", "ipopt"),
+            ", which alone keeps them",
+            place="calibrate",
             argument="constraints",
         )
 
@@ -253,27 +253,24 @@ def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -
         )
     if robot.turntables and start == "linear":
         raise ModelError(
-            f"calibrate: found start='linear' for {robot.name}, expected 'nominal'; closure is linear in the parameters of "
-            "linear guideways only"
+            f"expected 'nominal' for {robot.name}; closure is linear in the parameters of linear guideways only",
+            place="calibrate",
+            found=Given("start", start),
         )
 
 
 def _split(rows: np.ndarray, holdout: Any, measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
     if holdout is None:
         return rows, rows
-    if isinstance(holdout, str):
-        if holdout != "second":
-            raise ModelError(
-                f"calibrate: found holdout={holdout!r}, expected 'second', None, or rows", argument="holdout"
-            )
+    if isinstance(holdout, str) and holdout == "second":
         return rows[::2], rows[1::2]
     mask = np.zeros(len(measurements), dtype=bool)
     try:
         mask[np.asarray(holdout)] = True
     except (IndexError, ValueError):
         raise ModelError(
-            f"calibrate: found holdout={holdout!r}, expected rows from 0 to {len(measurements) - 1} or a mask of "
-            f"{len(measurements)}",
-            argument="holdout",
+            f"expected 'second', None, rows from 0 to {len(measurements) - 1} or a mask of {len(measurements)}",
+            place="calibrate",
+            found=Given("holdout", holdout),
         ) from None
     return rows[~mask[rows]], rows[mask[rows]]

@@ -1,9 +1,9 @@
 """Typical sizes of unknowns and of equations: what makes a problem the same in micrometres and in kilometres.
 
-    |row_r|  is of the size of its largest term:  max(known_r, max_j slope_rj size_j)
+    |row_r|  is of the size of its largest term:  max(known_r, max_j J_rj size_j)
 
-slope_rj: steepest slope of a row by an unknown along the first guess; known_r: what stands in it beside the unknowns, as a
-bound. A row of a state is T x' over the horizon T, in which the state itself has the slope 1. Sizes are those declared,
+J_rj: largest derivative of a row by an unknown along the first guess; known_r: what stands in it beside the unknowns, as a
+bound. A row of a state is T x' over the horizon T, in which the state itself has the derivative 1. Sizes are those declared,
 else those of limits, else those of the guess, where the elements of a vector share the largest; what is zero there has the
 size that balances its rows.
 """
@@ -22,9 +22,10 @@ from gantrytau_optimica.control.limits import signal_limits
 LOOSE = 1e4  # times the size that the rest tells: a limit that is farther away says nothing of the size
 NOISE = 1e-13  # of the largest guess of a kind: what rounding leaves of a zero
 ACCIDENT = 1e5  # times apart: the size of an algebraic at the guess, and of the terms of its equation
-BESIDE = 0.1  # of its size: how far from the guess slopes are looked at as well, which may vanish there by accident
+BESIDE = 0.1  # of its size: how far from the guess derivatives are looked at as well, which may vanish there by accident
 FINE = 1e-4  # of the terms of a condition: its bounds are no finer measure than this
-BEYOND = 1e8  # times outside of the range of all known sizes: what a slope tells that is left by rounding
+# times outside of the range of all known sizes: what a derivative tells that is left by rounding
+BEYOND = 1e8
 SHARES = np.linspace(0.0, 1.0, 11)  # of the horizon, at which guesses are looked at
 
 
@@ -54,14 +55,14 @@ def with_sizes(problem: ControlProblem) -> ControlProblem:
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """Steepest slopes (r, n) of rows by all signals and free numbers, and what else is known of their size, (r,)."""
+    """Largest derivatives (r, n) of rows by all signals and free numbers, and what else is known of their size, (r,)."""
 
-    slopes: np.ndarray
+    jacobian: np.ndarray
     known: np.ndarray
 
     def rows(self, sizes: np.ndarray) -> np.ndarray:
         """The size of every row by its largest term, 1 where it has none."""
-        found = np.max(self.slopes * sizes, axis=1, initial=0.0)
+        found = np.max(self.jacobian * sizes, axis=1, initial=0.0)
         found = np.where(found > 0, found, self.known)
         return np.where(found > 0, found, 1.0)
 
@@ -76,15 +77,15 @@ class Balance:
 
         strict: False where those that are not known count as nothing.
         """
-        missing = np.isnan(sizes) & (self.slopes > 0)
-        terms = self.slopes * np.nan_to_num(sizes)
+        missing = np.isnan(sizes) & (self.jacobian > 0)
+        terms = self.jacobian * np.nan_to_num(sizes)
         found = np.full(unknown.size, np.nan)
         for k, j in enumerate(unknown):
-            rows = np.flatnonzero(self.slopes[:, j] > 0)
+            rows = np.flatnonzero(self.jacobian[:, j] > 0)
             others, gaps = np.delete(terms[rows], j, axis=1), np.delete(missing[rows], j, axis=1)
             top = np.maximum(self.known[rows], np.max(others, axis=1, initial=0.0))
             alone = (top > 0) & ~(strict & np.any(gaps, axis=1))
-            told = top[alone] / self.slopes[rows[alone], j]
+            told = top[alone] / self.jacobian[rows[alone], j]
             found[k] = np.min(told[(told > likely[0]) & (told < likely[1])], initial=np.inf)
         found[np.isinf(found)] = np.nan
         return found
@@ -187,20 +188,20 @@ def _like_siblings(problem: ControlProblem, sizes: np.ndarray) -> np.ndarray:
 def _balance(problem: ControlProblem, around: np.ndarray) -> Balance:
     """All rows at the first guess: of every phase those of states, algebraics and limits; then the conditions."""
     width = len(problem.signals) + len(problem.free)
-    slopes, known = [np.zeros((0, width))], [np.zeros(0)]
+    jacobian, known = [np.zeros((0, width))], [np.zeros(0)]
     for phase, first in zip(problem.phases, _firsts(problem), strict=True):
         rates = phase.ode * (phase.final_time - phase.start_time)
         limits = phase.path_limits
         rows = ca.vertcat(rates, phase.residuals, *(limit.expression for limit in limits))
-        value, slope = _along(problem, phase, rows, SHARES, around[first : first + len(phase.signals)])
-        mine, nx = _placed(problem, phase, first, slope), len(phase.states)
+        value, derivatives = _along(problem, phase, rows, SHARES, around[first : first + len(phase.signals)])
+        mine, nx = _placed(problem, phase, first, derivatives), len(phase.states)
         mine[np.arange(nx), first + np.arange(nx)] += 1.0
-        slopes.append(mine)
+        jacobian.append(mine)
         known.append(np.append(value[: value.size - len(limits)], [_bound(limit) for limit in limits]))
     rows = ca.vertcat(ca.SX(0, 1), *(limit.expression for limit in problem.boundary))
-    slopes.append(_points(problem).slopes_of(problem, rows))
+    jacobian.append(_points(problem).jacobian_of(problem, rows))
     known.append(np.array([_bound(limit) for limit in problem.boundary]))
-    return Balance(np.vstack(slopes), np.concatenate(known))
+    return Balance(np.vstack(jacobian), np.concatenate(known))
 
 
 def _measured(problem: ControlProblem) -> np.ndarray:
@@ -208,10 +209,10 @@ def _measured(problem: ControlProblem) -> np.ndarray:
     found = np.full(len(problem.signals) + len(problem.free), np.nan)
     for phase, first in zip(problem.phases, _firsts(problem), strict=True):
         for one in phase.sums:
-            slope = _placed(problem, phase, first, _along(problem, phase, one.expression, SHARES)[1])[0]
+            derivatives = _placed(problem, phase, first, _along(problem, phase, one.expression, SHARES)[1])[0]
             largest = float(np.max(np.abs(one.values), initial=0.0))
-            told = (slope > 0) & (largest > 0)
-            found[told] = np.fmax(found[told], largest / slope[told])
+            told = (derivatives > 0) & (largest > 0)
+            found[told] = np.fmax(found[told], largest / derivatives[told])
     return found
 
 
@@ -230,31 +231,31 @@ def _firsts(problem: ControlProblem) -> list[int]:
     return [0, *np.cumsum([len(phase.signals) for phase in problem.phases])[:-1].tolist()]
 
 
-def _placed(problem: ControlProblem, phase: Phase, first: int, slope: np.ndarray) -> np.ndarray:
-    """Slopes by the signals of a phase and the free numbers in their columns among all."""
+def _placed(problem: ControlProblem, phase: Phase, first: int, derivatives: np.ndarray) -> np.ndarray:
+    """Derivatives by the signals of a phase and the free numbers in their columns among all."""
     count, numbers = len(phase.signals), len(problem.free)
-    found = np.zeros((slope.shape[0], len(problem.signals) + numbers))
-    found[:, first : first + count] = slope[:, :count]
-    found[:, found.shape[1] - numbers :] = slope[:, count:]
+    found = np.zeros((derivatives.shape[0], len(problem.signals) + numbers))
+    found[:, first : first + count] = derivatives[:, :count]
+    found[:, found.shape[1] - numbers :] = derivatives[:, count:]
     return found
 
 
 def _along(
     problem: ControlProblem, phase: Phase, rows: ca.SX, shares: np.ndarray, around: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Largest values (r,) and steepest slopes (r, signals + numbers) of expressions along the first guess of a phase.
+    """Largest values (r,) and largest derivatives (r, signals + numbers) of expressions along the first guess of a phase.
 
-    around: sizes of the signals, by a part of which slopes are looked at beside the guess as well.
+    around: sizes of the signals, by a part of which derivatives are looked at beside the guess as well.
     """
     start, stop = horizon(problem, phase)
     times = start + (stop - start) * shares
     signals = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.signals))
     courses = ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses))
-    slope = ca.jacobian(rows, ca.vertcat(signals, problem.numbers))
+    derivatives = ca.jacobian(rows, ca.vertcat(signals, problem.numbers))
     function = ca.Function(
         "balance",
         [problem.time, signals, courses, problem.numbers],
-        [ca.densify(ca.vertcat(rows, *slope.nonzeros()))],
+        [ca.densify(ca.vertcat(rows, *derivatives.nonzeros()))],
     )
     guesses = np.array([s.guess(shares) for s in phase.signals]).reshape(-1, shares.size)
     known = np.array([c.value(times) for c in phase.courses]).reshape(-1, shares.size)
@@ -268,10 +269,10 @@ def _along(
             [beside, _columns(function, times, guesses + moved, known, numbers)[rows.numel() :]]
         )
     value = values[: rows.numel()]
-    slopes = np.zeros(slope.shape)
-    row, column = (np.array(part, dtype=int) for part in slope.sparsity().get_triplet())
-    slopes[row, column] = np.max(np.abs(beside), axis=1)
-    return value[np.arange(len(value)), np.argmax(np.abs(value), axis=1)], slopes
+    jacobian = np.zeros(derivatives.shape)
+    row, column = (np.array(part, dtype=int) for part in derivatives.sparsity().get_triplet())
+    jacobian[row, column] = np.max(np.abs(beside), axis=1)
+    return value[np.arange(len(value)), np.argmax(np.abs(value), axis=1)], jacobian
 
 
 def _columns(function: ca.Function, times: np.ndarray, *rest: np.ndarray) -> np.ndarray:
@@ -287,34 +288,34 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Values at single times at the first guess: symbols and values (k,), steepest slopes (k, n) by all unknowns."""
+    """Values at single times at the first guess: symbols and values (k,), largest derivatives (k, n) by all unknowns."""
 
     symbols: ca.SX
     values: np.ndarray
-    slopes: np.ndarray
+    jacobian: np.ndarray
 
-    def slopes_of(self, problem: ControlProblem, rows: ca.SX) -> np.ndarray:
-        """Steepest slopes (r, n) of expressions of the points and the free numbers."""
+    def jacobian_of(self, problem: ControlProblem, rows: ca.SX) -> np.ndarray:
+        """Largest derivatives (r, n) of expressions of the points and the free numbers."""
         arguments = [self.symbols, problem.numbers]
-        function = ca.Function("slopes", arguments, [ca.densify(ca.jacobian(rows, x)) for x in arguments])
+        function = ca.Function("jacobian", arguments, [ca.densify(ca.jacobian(rows, x)) for x in arguments])
         found = function(self.values, [n.guess for n in problem.free])
         by_points, by_numbers = (np.abs(_finite(np.array(x))) for x in found)
-        total = by_points @ self.slopes
+        total = by_points @ self.jacobian
         total[:, total.shape[1] - len(problem.free) :] += by_numbers
         return total
 
 
 def _points(problem: ControlProblem) -> _Points:
     symbols, values = [ca.SX(0, 1)], [np.zeros(0)]
-    slopes = [np.zeros((0, len(problem.signals) + len(problem.free)))]
+    jacobian = [np.zeros((0, len(problem.signals) + len(problem.free)))]
     for phase, first in zip(problem.phases, _firsts(problem), strict=True):
         for point in phase.points:
             share = float(point.time == "final") if isinstance(point.time, str) else 0.5
-            value, slope = _along(problem, phase, point.expression, np.array([share]))
+            value, derivatives = _along(problem, phase, point.expression, np.array([share]))
             symbols.append(point.symbol)
             values.append(value)
-            slopes.append(_placed(problem, phase, first, slope))
-    return _Points(ca.vertcat(*symbols), np.concatenate(values), np.vstack(slopes))
+            jacobian.append(_placed(problem, phase, first, derivatives))
+    return _Points(ca.vertcat(*symbols), np.concatenate(values), np.vstack(jacobian))
 
 
 def _aims(problem: ControlProblem) -> np.ndarray:
@@ -322,8 +323,8 @@ def _aims(problem: ControlProblem) -> np.ndarray:
     found = np.full(len(problem.signals) + len(problem.free), np.nan)
     for phase, first in zip(problem.phases, _firsts(problem), strict=True):
         signals = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.signals))
-        slope, curvature = _steepness(phase.integrand, signals)
-        value, _ = _along(problem, phase, ca.vertcat(slope, curvature), SHARES)
+        gradient, curvature = _steepness(phase.integrand, signals)
+        value, _ = _along(problem, phase, ca.vertcat(gradient, curvature), SHARES)
         found[first : first + len(phase.signals)] = _steps(*np.split(value, 2))
     points = _points(problem)
     sums = {
@@ -336,16 +337,16 @@ def _aims(problem: ControlProblem) -> np.ndarray:
     values = function(points.values, [n.guess for n in problem.free], *(0.0 for _ in sums))
     steps = _steps(*(_finite(np.array(x).ravel()) for x in values))
     with np.errstate(divide="ignore"):
-        each = np.where(points.slopes > 0, steps[:, None] / points.slopes, np.nan)
+        each = np.where(points.jacobian > 0, steps[:, None] / points.jacobian, np.nan)
     return np.fmax(found, np.fmax.reduce(each, axis=0, initial=np.nan))
 
 
 def _steepness(cost: ca.SX, unknowns: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Slopes and curvatures of a cost by each unknown."""
-    curved, slope = ca.hessian(cost, unknowns)
-    return slope, ca.diag(curved)
+    """Gradient and curvatures of a cost by each unknown."""
+    curved, gradient = ca.hessian(cost, unknowns)
+    return gradient, ca.diag(curved)
 
 
-def _steps(slope: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-    told = (slope != 0) & (curvature != 0)
-    return np.abs(np.divide(slope, curvature, out=np.full(slope.size, np.nan), where=told))
+def _steps(gradient: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+    known = (gradient != 0) & (curvature != 0)
+    return np.abs(np.divide(gradient, curvature, out=np.full(gradient.size, np.nan), where=known))

@@ -16,6 +16,8 @@ from typing import Any, Literal, Unpack
 import numpy as np
 
 from gantrytau import Model, ModelError, SolveError
+from gantrytau.border.checks import check_words, instance
+from gantrytau.border.refusal import Given
 from gantrytau.language.symbols import split_derivative
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
@@ -42,8 +44,8 @@ from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.ipopt import WORDS, Solver, SolverSettings
 from gantrytau_optimica.transcription.mesh import Mesh, mesh_of, with_jumps
 from gantrytau_optimica.transcription.program import Program, first_guess
-from gantrytau_optimica.transcription.scheme import collocation
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.scheme import radau
+from gantrytau_optimica.transcription.transcribe import transcribe, transcribed_again
 
 SOLVED = WORDS["Solve_Succeeded"]
 MOST_STEPS, SHARE = 30, 0.8  # steps from the first guesses, and the part of the time that they leave
@@ -65,15 +67,19 @@ def estimate(
     parameters: name in the model -> Free(guess, min=..., max=...) or a guess, the same in all experiments; limits
     default to those that the model declares. loss: "robust" bounds the influence of stray values (Huber's). elements of
     every experiment: those given, and what they cost is told; by default they are cut where they matter until the
-    estimate stands. points, scheme ("radau" or "gauss"), tolerance, max_iterations, max_time and progress: as for
+    estimate stands. points, scheme (any but "shooting"), tolerance, max_iterations, max_time and progress: as for
     `optimize`. Without deviations of the data every measured name has a noise of its own, which the fit leaves. Raises
     ModelError for what is written wrongly and for data that are fewer than the parameters, SolveError with `.optimum`
     where no solution is found, where Ctrl-C is pressed, or where the data cannot tell parameters apart; its message
     names them.
     """
     begin = time.perf_counter()
+    check_words(estimate, locals())
     asked = policy_of("estimate", MeshKeywords, policy)
-    _check(parameters, loss, asked)
+    if not asked.transcription.refinable:
+        found = Given("scheme", asked.scheme)
+        raise ModelError("expected 'radau', 'gauss' or 'lobatto'", place="estimate", found=found)
+    instance("estimate", "parameters", parameters, Mapping, "{name: Free(guess)}")
     trials = named(experiments)
     known = next(iter(trials[0].measured.values())).weighted
     read = plan(model, parameters, trials, {} if known else expected_noise(trials))
@@ -92,15 +98,6 @@ def estimate(
             if isinstance(end, KeyboardInterrupt):
                 raise
             raise reached.stopped(LATE) from None
-
-
-def _check(parameters: Any, loss: Any, policy: Policy) -> None:
-    if policy.shooting:
-        raise ModelError("estimate: found scheme='shooting', expected 'radau' or 'gauss'", argument="scheme")
-    if not isinstance(parameters, Mapping):
-        raise ModelError(f"estimate: found parameters={parameters!r}, expected {{name: Free(guess)}}")
-    if loss not in ("squares", "robust"):
-        raise ModelError(f"estimate: found loss={loss!r}, expected 'squares' or 'robust'", argument="loss")
 
 
 def _check_amount(read: Plan, known: bool) -> None:
@@ -205,7 +202,7 @@ class _Work:
         return min(found, key=lambda one: one.objective)
 
     def _program(self, meshes: Sequence[Mesh]) -> Program:
-        scheme = collocation("radau", 1) if self.read.static else self.asked.collocation
+        scheme = radau(1) if self.read.static else self.asked.transcription
         return transcribe(self.built.problem, meshes, scheme)
 
     def _from_the_guess(self, program: Program) -> Optimum | None:
@@ -309,6 +306,4 @@ class _Work:
 
 
 def _weighted(program: Program, weights: Weights) -> Program:
-    layouts = program.places.layouts
-    problem = weighted(program.problem, weights.roots)
-    return transcribe(problem, [layout.mesh for layout in layouts], layouts[0].scheme)
+    return transcribed_again(program, weighted(program.problem, weights.roots))

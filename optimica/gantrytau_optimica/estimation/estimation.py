@@ -7,17 +7,13 @@ import numpy as np
 
 from gantrytau import SolveError
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.estimation.collinear_parameters import (
-    LocalSlopes,
-    indistinguishable,
-    without_influence,
-)
 from gantrytau_optimica.estimation.estimation_problem import Plan
 from gantrytau_optimica.estimation.fit_on_mesh import AT_BOUND, MeshFit
 from gantrytau_optimica.estimation.parameter_fit import ParameterFit
 from gantrytau_optimica.estimation.refined_fit import RefinedFit
 from gantrytau_optimica.estimation.report import draw_fit, report_fit
 from gantrytau_optimica.estimation.weights import Weighing
+from gantrytau_optimica.fitting.rank import LocalJacobian, local_messages, not_told_apart, without_influence
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,15 +78,15 @@ def _refuse_lost(read: Plan, refined: RefinedFit, optimum: Optimum, inner: list[
     fit, error = refined.fit, refined.error
     program, roots = fit.residuals.program, _even(read, fit)
     names = [program.problem.free[k].name for k in inner]
-    point = LocalSlopes((fit.jacobian * roots)[:, inner], fit.numbers[inner])
-    finer = None if error is None else LocalSlopes((error.jacobian * roots)[:, inner], point.values)
+    point = LocalJacobian((fit.jacobian * roots)[:, inner], fit.numbers[inner])
+    finer = None if error is None else LocalJacobian((error.jacobian * roots)[:, inner], point.values)
     sizes = fit.sizes[inner]
     seen = [point] if finer is None else [point, finer]
     silent = sorted(set.intersection(*(set(without_influence(one, sizes)) for one in seen)))
     kept = [k for k in range(len(inner)) if k not in silent]
-    words = [f"{names[k]} has no influence on what was measured" for k in silent]
+    words = [not_told_apart([names[k] for k in silent], ())] if silent else []
     if kept:
-        words += indistinguishable(
+        words += local_messages(
             [names[k] for k in kept],
             point.of(kept),
             sizes[kept],
@@ -115,7 +111,7 @@ def _even(read: Plan, fit: MeshFit) -> np.ndarray:
     return 1.0 / np.array([size or whole for size in sizes])[read.outputs][:, None]
 
 
-def _elsewhere(fit: MeshFit, inner: list[int], kept: list[int], roots: np.ndarray) -> LocalSlopes | None:
+def _elsewhere(fit: MeshFit, inner: list[int], kept: list[int], roots: np.ndarray) -> LocalJacobian | None:
     """Slopes with respect to the kept of the inner numbers at another point, a tenth away."""
     numbers = fit.numbers.copy()
     numbers[inner] += fit.sizes[inner] * 0.1 * (1 + np.arange(len(inner)) / len(inner))
@@ -123,4 +119,4 @@ def _elsewhere(fit: MeshFit, inner: list[int], kept: list[int], roots: np.ndarra
     if moved is None:
         return None
     values = moved[fit.residuals.program.places.free][inner][kept]
-    return LocalSlopes((fit.residuals.jacobian(moved) * roots)[:, inner][:, kept], values)
+    return LocalJacobian((fit.residuals.jacobian(moved) * roots)[:, inner][:, kept], values)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Samples
+from gantrytau.border.checks import instance, number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.problem.optimization import Free, Optimization
 
@@ -39,11 +40,11 @@ class Experiment(Record):
     static: bool = field(default=False, init=False)
 
     def __post_init__(self):
+        for which in ("begin", "stop"):
+            if getattr(self, which) is not None:
+                number("Experiment", which, getattr(self, which), unit="s")
         for which in ("measured", "inputs", "start", "parameters", "guess"):
-            if not isinstance(getattr(self, which), Mapping):
-                raise ModelError(
-                    f"Experiment: found {which}={getattr(self, which)!r}, expected {{name: ...}}; name what it belongs to"
-                )
+            instance("Experiment", which, getattr(self, which), Mapping, "{name: ...}")
         if not self.measured:
             raise ModelError("Experiment: found nothing measured, expected {name: Samples(times, values)}")
         rows = [_rows(v) for v in self.measured.values()]
@@ -52,13 +53,6 @@ class Experiment(Record):
         object.__setattr__(self, "inputs", {n: self._input(n, v) for n, v in self.inputs.items()})
         last = max(s.times[-1] for s in self.measured.values())
         object.__setattr__(self, "stop", float(last) if self.stop is None else self.stop)
-        for which, value in (("begin", self.begin), ("stop", self.stop)):
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, (int, float, np.number))
-                or not np.isfinite(value)
-            ):
-                raise ModelError(f"Experiment: found {which}={value!r}, expected a time in s")
         if not self.static and not self.begin < self.horizon[1]:
             raise ModelError(
                 f"Experiment: found begin={self.begin:g} s and stop={self.stop:g} s, expected the first to be the smaller"

@@ -20,7 +20,7 @@ SETTLED = 1e-5  # of a deviation, or
 ROUGH, FIRM = 1e-3, 1e-2  # of it, that rounding may leave, and that limits of the model must cost to bind
 FINE = 1e-11  # of its size: a step of a number that changes nothing more
 SHARES = 0.5 ** np.arange(12)
-RANK = 1e-11  # of the largest singular value of normed slopes: directions in which no step is taken
+RANK = 1e-11  # of the largest singular value of the normed Jacobian: directions in which no step is taken
 LIMIT = 1e-7  # of typical sizes, by which a limit of the model may be passed
 AT_BOUND = 1e-6  # of its size, closer than this a parameter stands at a limit
 REWEIGHED = 40
@@ -33,7 +33,7 @@ Step = Callable[[float], None]  # told of the sum of squares before every step; 
 
 @dataclass(frozen=True, eq=False)
 class MeshFit:
-    """Numbers and motion on one mesh: unknowns w (n,), residuals (N,) and their slopes (N, k) as the program weighs them.
+    """Numbers and motion on one mesh: unknowns w (n,), residuals (N,) and their Jacobian (N, k) as the program weighs them.
 
     limited: whether limits of the model's variables hold the motion.
     """
@@ -132,27 +132,27 @@ def _change(found: Residuals, at: np.ndarray, roots: np.ndarray) -> tuple[np.nda
     free = program.places.free
     scale = program.places.scale[free]
     low, high = program.lbw[free] * scale - at[free], program.ubw[free] * scale - at[free]
-    errors, slopes = found.values(at) * roots, found.jacobian(at) * roots[:, None]
-    change = bounded_step(slopes, errors, scale, low, high)
+    errors, jacobian = found.values(at) * roots, found.jacobian(at) * roots[:, None]
+    change = bounded_step(jacobian, errors, scale, low, high)
     size = np.linalg.norm(errors) / np.sqrt(max(errors.size - free.size, 1))
-    return change, float(np.linalg.norm(slopes @ change)), float(size)
+    return change, float(np.linalg.norm(jacobian @ change)), float(size)
 
 
 def bounded_step(
-    slopes: np.ndarray, errors: np.ndarray, sizes: np.ndarray, low: np.ndarray, high: np.ndarray
+    jacobian: np.ndarray, errors: np.ndarray, sizes: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """The step (k,) within low and high that makes |errors + slopes step| least; of several the smallest."""
+    """The step (k,) within low and high that makes |errors + jacobian step| least; of several the smallest."""
     from scipy.optimize import lsq_linear
 
-    norms = np.linalg.norm(slopes * sizes, axis=0)
+    norms = np.linalg.norm(jacobian * sizes, axis=0)
     norms = sizes / np.where(norms > 0, norms, 1.0)
-    step = norms * np.linalg.lstsq(slopes * norms, -errors, rcond=RANK)[0]
+    step = norms * np.linalg.lstsq(jacobian * norms, -errors, rcond=RANK)[0]
     if np.all((step >= low) & (step <= high)):
         return step
     low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
     open_ = high - low > 0
     inside = lsq_linear(
-        slopes[:, open_] * norms[open_], -errors, ((low / norms)[open_], (high / norms)[open_]), "bvls"
+        jacobian[:, open_] * norms[open_], -errors, ((low / norms)[open_], (high / norms)[open_]), "bvls"
     )
     step = np.zeros(sizes.size)
     step[open_] = np.clip(norms[open_] * inside.x, low[open_], high[open_])
@@ -174,14 +174,14 @@ def _inside(found: Residuals, w: np.ndarray, room: float) -> bool:
 def solution_at(program: Program, w: np.ndarray, before: Solution) -> Solution:
     """Unknowns w of a fit as a solution of its program, with the multipliers that belong to them.
 
-    Of the equations, G_y^T lambda = -f_y; of the limits, what is then left of the slope by the free numbers.
+    Of the equations, G_y^T lambda = -f_y; of the limits, what is then left of the gradient by the free numbers.
     """
     found = residuals(program)
     x, free, scale = w / program.places.scale, program.places.free, program.places.scale
     objective, rows = program.assembled.nlp(x, [])
-    slope = np.array(program.assembled.grad_f(x, [])[1]).ravel()
+    gradient = np.array(program.assembled.grad_f(x, [])[1]).ravel()
     multipliers, bounds = np.zeros(program.assembled.rows), np.zeros(w.size)
-    equations, own = found.multipliers(w, slope)
+    equations, own = found.multipliers(w, gradient)
     multipliers[found.equations] = equations
     bounds[free] = own / scale[free]
     return replace(

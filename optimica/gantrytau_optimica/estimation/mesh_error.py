@@ -20,7 +20,7 @@ from gantrytau_optimica.transcription.layout import Layout
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 COARSE = 0.2  # deviations by which a finer mesh may move a number, or
 FINE, FINEST = 1e-7, 1e-11  # of its size, without and with deviations of the data
@@ -35,7 +35,7 @@ INNER = 0.02  # of an element, off its ends: where it is cut at a corner
 class MeshError:
     """What the mesh of a fit costs.
 
-    finer, w: the mesh of twice the elements, and the motion on it with the numbers of the fit; jacobian (N, k): slopes
+    finer, w: the mesh of twice the elements, and the motion on it with the numbers of the fit; jacobian (N, k): derivatives
     there; shift (k,): how far the best numbers there are off, about; parts: by phase, contributions (elements, k);
     deviations (k,): of the numbers there; allowed (k,): shifts that hardly matter; misfit: whether chi-square is more
     than that of the noise because of the mesh.
@@ -66,15 +66,14 @@ class MeshError:
 def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
     """What the mesh costs; None where the motion on a finer one is not found. known: deviations of the data were given."""
     program = fit.residuals.program
-    problem, layouts = program.problem, program.places.layouts
-    finer = residuals(transcribe(problem, halved(fit), layouts[0].scheme))
+    finer = residuals(transcribed_again(program, meshes=halved(fit)))
     near = carried_over(program, fit.w, finer.program)
     w = finer.on_manifold(near, fit.numbers)
     if w is None:
         return None
     inner, roots = fit.inner, fit.weights.roots
-    slopes, errors = finer.jacobian(w), finer.values(w) * roots
-    weighed = slopes[:, inner] * roots[:, None]
+    jacobian, errors = finer.jacobian(w), finer.values(w) * roots
+    weighed = jacobian[:, inner] * roots[:, None]
     free, scale = fit.residuals.program.places.free, fit.residuals.program.places.scale
     low, high = program.lbw[free] * scale[free] - fit.numbers, program.ubw[free] * scale[free] - fit.numbers
     shift = np.zeros(fit.numbers.size)
@@ -87,8 +86,8 @@ def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
     parts[:, inner] = finer.defects(near, -inverse * roots)
     lost = np.sum((fit.errors * roots) ** 2) - np.sum(left**2)
     return MeshError(
-        finer, w, slopes, shift, _by_element(finer, layouts, parts), deviations, _allowed(deviations, fit, known),
-        misfit=bool(known and lost > SCATTER * np.sqrt(2 * left.size)),
+        finer, w, jacobian, shift, _by_element(finer, program.places.layouts, parts), deviations,
+        _allowed(deviations, fit, known), misfit=bool(known and lost > SCATTER * np.sqrt(2 * left.size)),
     )  # fmt: skip
 
 
@@ -125,11 +124,11 @@ def carried_over(program: Program, w: np.ndarray, other: Program) -> np.ndarray:
     return found
 
 
-def _inverse(slopes: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Pseudoinverse (k, N) of slopes (N, k), by columns of equal length."""
-    norms = np.linalg.norm(slopes, axis=0)
+def _inverse(jacobian: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Pseudoinverse (k, N) of a Jacobian (N, k), by columns of equal length."""
+    norms = np.linalg.norm(jacobian, axis=0)
     norms = np.where(norms > 0, norms, 1.0 / sizes)
-    return np.linalg.pinv(slopes / norms, rcond=RANK) / norms[:, None]
+    return np.linalg.pinv(jacobian / norms, rcond=RANK) / norms[:, None]
 
 
 def _by_element(finer: Residuals, layouts: Sequence[Layout], parts: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -10,12 +10,13 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
-from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
+from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
 from gantrytau_optimica.fitting.robust import robust_deviation
 
@@ -166,8 +167,7 @@ class ParameterFit(Record):
         """
         from scipy import stats
 
-        if not isinstance(confidence, float) or not 0 < confidence < 1:
-            raise ModelError(f"intervals: found confidence={confidence!r}, expected a number between 0 and 1")
+        number("intervals", "confidence", confidence, above=0.0, below=1.0)
         wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)
         half = float(wide.ppf((1 + confidence) / 2))
         return {

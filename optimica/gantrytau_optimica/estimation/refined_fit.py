@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.estimation.collinear_parameters import LocalSlopes, silent_directions
 from gantrytau_optimica.estimation.fit_on_mesh import MeshFit, Solve, Step, fit_on_mesh
 from gantrytau_optimica.estimation.mesh_error import (
     MeshError,
@@ -19,8 +18,9 @@ from gantrytau_optimica.estimation.mesh_error import (
 )
 from gantrytau_optimica.estimation.residuals import residuals
 from gantrytau_optimica.estimation.weights import Weighing
+from gantrytau_optimica.fitting.rank import LocalJacobian, null_space
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 MOST_ROUNDS, FEW_ROUNDS = 14, 3  # the latter where limits of the model hold the motion
 MOST_ELEMENTS = 6000
@@ -95,9 +95,9 @@ def _resolved(fit: MeshFit, error: MeshError) -> bool:
     """Whether the mesh is fine enough to say which parameters the data determine."""
     inner, roots = fit.inner, fit.weights.roots[:, None]
     here, there = (
-        LocalSlopes(j[:, inner] * roots, fit.numbers[inner]) for j in (fit.jacobian, error.jacobian)
+        LocalJacobian(j[:, inner] * roots, fit.numbers[inner]) for j in (fit.jacobian, error.jacobian)
     )
-    return silent_directions(here, fit.sizes[inner], there).resolved
+    return null_space(here, fit.sizes[inner], there).resolved
 
 
 def fit_on(
@@ -110,16 +110,15 @@ def fit_on(
 ) -> MeshFit | None:
     """The fit on other meshes, from this one; None where it is not found. Raises TimeOver."""
     program = fit.residuals.program
-    layouts = program.places.layouts
     if error is not None:
         program, w = error.finer.program, error.w
-        same = [layout.mesh.borders for layout in program.places.layouts]
-        if all(np.array_equal(mesh.borders, borders) for mesh, borders in zip(meshes, same, strict=True)):
+        pairs = zip(meshes, program.meshes, strict=True)
+        if all(np.array_equal(mesh.borders, same.borders) for mesh, same in pairs):
             return fit_on_mesh(error.finer, w, weighing, fit.weights, solve, step)
     else:
         w = fit.w
     step(_cost(fit))
-    found = residuals(transcribe(program.problem, meshes, layouts[0].scheme))
+    found = residuals(transcribed_again(program, meshes=meshes))
     return fit_on_mesh(found, carried_over(program, w, found.program), weighing, fit.weights, solve, step)
 
 

@@ -26,12 +26,15 @@ from gantrytau_optimica.transcription.program import Program
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
-CLOSER, CHORD = 1e-12, 0.1  # the last one with slopes of another point, and what each of these must gain
+CLOSER, CHORD = (
+    1e-12,
+    0.1,
+)  # the last one with the Jacobian of another point, and what each of these must gain
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals (N,) in deviations of all samples of a program, and their exact slopes; w: unscaled unknowns (n,).
+    """Residuals (N,) in deviations of all samples of a program, and their exact Jacobian; w: unscaled unknowns (n,).
 
     sizes: number of residuals of every sum over samples, in the order of the phases.
     """
@@ -39,16 +42,15 @@ class Residuals:
     program: Program
     assembled: Assembled
     sizes: tuple[int, ...]
-    _last: dict[str, Any] = field(
-        default_factory=dict
-    )  # slopes of the equations where they were factorised last
+    # Jacobian of the equations where they were factorised last
+    _last: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def _slopes(self) -> "_Sparse":
+    def _of_samples(self) -> "_Sparse":
         return _Sparse.of(self.assembled.jac_g, self.program.places.scale)
 
     @cached_property
-    def _gradients(self) -> "_Sparse":
+    def _of_rows(self) -> "_Sparse":
         return _Sparse.of(self.program.assembled.jac_g, self.program.places.scale)
 
     @property
@@ -71,14 +73,14 @@ class Residuals:
         return np.setdiff1d(np.arange(self.program.places.size), self.program.places.free)
 
     def jacobian(self, w: np.ndarray) -> np.ndarray:
-        """Slopes (N, k) with respect to the free numbers in their units."""
+        """Jacobian (N, k) with respect to the free numbers in their units."""
         program, free = self.program, self.program.places.free
-        slopes = self._slopes.at(w)
-        found = slopes[:, free].toarray()
+        by_unknowns = self._of_samples.at(w)
+        found = by_unknowns[:, free].toarray()
         if self.others.size:
             equations, factors = self._factorised(w)
             moved = factors.solve(equations[:, free].toarray())
-            found = found - slopes[:, self.others] @ moved
+            found = found - by_unknowns[:, self.others] @ moved
         return found / program.places.scale[free]
 
     def defects(self, w: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -89,18 +91,18 @@ class Residuals:
         scaled = w / self.program.places.scale
         _, factors = self._factorised(w)
         values = np.array(self.program.assembled.nlp(scaled, [])[1]).ravel()
-        slopes = self._slopes.at(w)[:, self.others]
-        adjoint = factors.solve((slopes.T @ rows.T), trans="T")
+        by_unknowns = self._of_samples.at(w)[:, self.others]
+        adjoint = factors.solve((by_unknowns.T @ rows.T), trans="T")
         return -adjoint * (values - self.program.lbg)[self.equations, None]
 
-    def multipliers(self, w: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the equations, and of the limits of the free numbers, where the objective has a scaled slope (n,)."""
+    def multipliers(self, w: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Those of the equations, and of the limits of the free numbers, where the objective has a scaled gradient (n,)."""
         if not self.others.size:
-            return np.zeros(0), -slope[self.program.places.free]
+            return np.zeros(0), -gradient[self.program.places.free]
         equations, factors = self._factorised(w)
-        found = factors.solve(-slope[self.others], trans="T")
+        found = factors.solve(-gradient[self.others], trans="T")
         free = self.program.places.free
-        return found, -slope[free] - equations[:, free].T @ found
+        return found, -gradient[free] - equations[:, free].T @ found
 
     def on_manifold(self, w: np.ndarray, numbers: np.ndarray) -> np.ndarray | None:
         """Unknowns that fulfil the equations for other free numbers, by Newton's method from w; None if it fails."""
@@ -113,7 +115,7 @@ class Residuals:
                 (values - self.program.lbg)[self.equations]
             )  # fmt: skip
             size = np.max(np.abs(step), initial=0.0)
-            if not size <= CHORD * before and not fresh:  # old slopes lead no further
+            if not size <= CHORD * before and not fresh:  # the old Jacobian leads no further
                 try:
                     factors, fresh, before = self._factorised(w)[1], True, np.inf
                 except ModelError:
@@ -128,10 +130,10 @@ class Residuals:
         return None
 
     def _factorised(self, w: np.ndarray) -> tuple[Any, SuperLU]:
-        """Slopes of the equations, and the factors of those with respect to the other unknowns."""
+        """Jacobian of the equations, and the factors of those with respect to the other unknowns."""
         if "at" in self._last and np.array_equal(self._last["at"], w):
             return self._last["equations"], self._last["factors"]
-        equations = self._gradients.at(w)[self.equations]
+        equations = self._of_rows.at(w)[self.equations]
         try:
             factors = splu(equations[:, self.others].tocsc())
         except (RuntimeError, ValueError) as error:
@@ -159,7 +161,7 @@ class _Sparse:
         return _Sparse(function, scale, np.array(pattern.row()), np.array(pattern.colind()), pattern.shape)
 
     def at(self, w: np.ndarray) -> Any:
-        """Slopes by scaled unknowns at unknowns w, by columns."""
+        """Derivatives by scaled unknowns at unknowns w, by columns."""
         found = self.function(w / self.scale, [])[1]
         values = np.array(found.nz[:]).ravel() if self.rows.size else np.zeros(0)
         return sparse.csc_matrix((values, self.rows, self.starts), shape=self.shape)

@@ -13,11 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from gantrytau_optimica.fitting.robust import robust_deviation
+from gantrytau_optimica.fitting.robust import huber_weights, robust_deviation
 
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
 FEWEST = 2  # degrees of freedom from which an output has its own noise; below, it is that of the others
-HUBER = 1.345  # deviations beyond which errors count linearly: 95 % as efficient where noise is normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +60,11 @@ class Weighing:
         return Weights.even(self.outputs.size)
 
     def weights(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> Weights:
-        """Weights that the residuals (N,) with slopes (N, k) ask for; before: those they were fitted with."""
+        """Weights that the residuals (N,) with the Jacobian (N, k) ask for; before: those they were fitted with."""
         noise = before.noise if self.known else self._noise(errors, jacobian, before)
         if self.loss == "squares":
             return Weights(noise, before.huber)
-        return Weights(noise, np.minimum(1.0, HUBER * noise / np.maximum(np.abs(errors), 1e-300)))
+        return Weights(noise, huber_weights(errors / noise))
 
     def _noise(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> np.ndarray:
         mine = [np.flatnonzero(self.outputs == g) for g in range(self.count)]
@@ -80,8 +79,8 @@ class Weighing:
         return np.maximum(found, LEAST)[self.outputs]
 
 
-def _told(slopes: np.ndarray) -> np.ndarray:
-    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the slopes."""
-    norms = np.linalg.norm(slopes, axis=0)
-    basis, singular, _ = np.linalg.svd(slopes / np.where(norms > 0, norms, 1.0), full_matrices=False)
+def _told(jacobian: np.ndarray) -> np.ndarray:
+    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the Jacobian."""
+    norms = np.linalg.norm(jacobian, axis=0)
+    basis, singular, _ = np.linalg.svd(jacobian / np.where(norms > 0, norms, 1.0), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)

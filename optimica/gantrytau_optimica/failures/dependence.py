@@ -11,7 +11,7 @@ from gantrytau import ModelError
 from gantrytau_optimica.failures.constraint_labels import MEANING
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 COARSE = 4  # elements on which dependence is looked for; it does not change with their number
 MOST = 3000  # unknowns up to which dense matrices are quick
@@ -23,12 +23,8 @@ def dependent_conditions(program: Program) -> list[str]:
     """Conditions of the user that follow from others or contradict them near the first guess: each, and what decides it."""
     if any(layout.mesh.moving for layout in program.places.layouts):
         return []
-    meshes = [
-        Mesh(np.linspace(0.0, 1.0, min(COARSE, layout.mesh.elements) + 1))
-        for layout in program.places.layouts
-    ]
-    scheme = program.places.layouts[0].scheme
-    coarse = transcribe(program.problem, meshes, scheme)
+    meshes = [Mesh(np.linspace(0.0, 1.0, min(COARSE, mesh.elements) + 1)) for mesh in program.meshes]
+    coarse = transcribed_again(program, meshes=meshes)
     if coarse.places.size > MOST:
         return []
     x = _beside(first_guess(coarse) / coarse.places.scale)

@@ -28,9 +28,8 @@ from gantrytau_optimica.transcription.assemble import to_dm
 from gantrytau_optimica.transcription.program import Program
 
 START = 2.0  # price of a start against other conditions: it is a fact more often than a wish
-LATER = (
-    0.02  # by which what is written later is cheaper, so that of two equals one gives way, not both by half
-)
+# by which what is written later is cheaper, so that of two equals one gives way, not both by half
+LATER = 0.02
 PATIENCE = 5.0  # s of waiting for a second of computing: other programs take their share
 LINKS = (" begins where ", " begins when ")  # conditions between phases belong to the model
 
@@ -75,21 +74,8 @@ def soft_conditions(program: Program, w: np.ndarray) -> list[Soft]:
             (f"max of {number.name}", -np.inf, number.max, np.inf),
         ):
             if np.isfinite(low) or np.isfinite(high):
-                found.append(
-                    Soft(
-                        name,
-                        False,
-                        np.array([place]),
-                        low,
-                        high,
-                        scale,
-                        scale,
-                        1.0,
-                        np.array([np.nan]),
-                        -1,
-                        limit,
-                    )
-                )
+                where, never = np.array([place]), np.array([np.nan])
+                found.append(Soft(name, False, where, low, high, scale, scale, 1.0, never, -1, limit))
     count = max(len(found) - 1, 1)
     return [
         replace(s, price=(START if _is_start(s.name) else 1.0) * (1 - LATER * k / count))
@@ -126,13 +112,8 @@ class Elastic:
             np.arange(assembled.rows),
             np.concatenate([np.zeros(0, int), *(s.where for s in softs if s.of_rows)]),
         )
-        select, pick, give, low, high = (
-            [hard],
-            [np.full(hard.size, -1)],
-            [np.zeros(hard.size)],
-            [program.lbg[hard]],
-            [program.ubg[hard]],
-        )
+        select, pick, give = [hard], [np.full(hard.size, -1)], [np.zeros(hard.size)]
+        low, high = [program.lbg[hard]], [program.ubg[hard]]
         owner = [np.full(hard.size, -1)]
         for k, soft in enumerate(softs):
             for bound, sign in ((soft.lower, 1.0), (soft.upper, -1.0)):
@@ -189,36 +170,17 @@ class Elastic:
         nlp, derivatives = self.functions
         m = len(self.softs)
         watch = Watch(self.size + m, self.rows)
-        options = {
-            "iteration_callback": watch,
-            "print_time": False,
-            "calc_lam_p": False,
-            "show_eval_warnings": False,
-        }
-        ipopt = {
-            "print_level": 0,
-            "sb": "yes",
-            "mu_strategy": "adaptive",
-            "tol": 1e-8,
-            "max_iter": 500,
-            "max_cpu_time": left,
-        }
-        solver = ca.nlpsol("relaxed", "ipopt", nlp, options | derivatives | {"ipopt": ipopt})
+        quiet = {"print_time": False, "calc_lam_p": False, "show_eval_warnings": False}
+        ipopt = {"print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "tol": 1e-8, "max_iter": 500}
+        options = quiet | derivatives | {"iteration_callback": watch, "ipopt": ipopt | {"max_cpu_time": left}}
+        solver = ca.nlpsol("relaxed", "ipopt", nlp, options)
         most = np.zeros(m)
         most[list(which)] = [self.softs[k].most / self.softs[k].size for k in which]
         scaled = start / self.program.places.scale
         watch.begin(Clock(PATIENCE * left))
-        found = attended(
-            solver,
-            watch,
-            dict(
-                x0=np.concatenate([scaled, self._needed(scaled)]),
-                lbx=np.concatenate([self.lbw, np.zeros(m)]),
-                ubx=np.concatenate([self.ubw, most]),
-                lbg=self.low,
-                ubg=self.high,
-            ),
-        )
+        first = np.concatenate([scaled, self._needed(scaled)])
+        limits = dict(lbx=np.append(self.lbw, np.zeros(m)), ubx=np.append(self.ubw, most))
+        found = attended(solver, watch, dict(x0=first, lbg=self.low, ubg=self.high, **limits))
         if watch.pressed:
             raise KeyboardInterrupt
         if found is None or not solver.stats()["success"]:

@@ -60,7 +60,7 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
     elif solution.status in UNFINISHED:
         lines += _accuracy(program, solution, meanings, met=True)
     if not solution.success and solution.status in (*STUCK, *UNFINISHED):
-        bent = _list("Not smooth, so that slopes jump:", kinks(program.problem), 4)
+        bent = _list("Not smooth, so that derivatives jump:", kinks(program.problem), 4)
         lines += [*bent, f"{WAY_OUT}."] if bent else []
     if solution.status in (WORDS["Infeasible_Problem_Detected"], WORDS["Not_Enough_Degrees_Of_Freedom"]):
         lines += _list("Depending on each other:", dependent_conditions(program), 6)
@@ -171,8 +171,8 @@ def _accuracy(program: Program, solution: Solution, meanings: Meanings, met: boo
     gradient = np.array(program.assembled.grad_f(x, none)[1]).ravel()
     jacobian = program.assembled.jac_g(x, none)[1]
     pull = np.array(ca.mtimes(jacobian.T, ca.DM(solution.multipliers))).ravel()
-    slope = np.abs(gradient + pull + solution.bound_multipliers * program.places.scale)
-    if not (np.all(np.isfinite(slope)) and missing.size):
+    gradient = np.abs(gradient + pull + solution.bound_multipliers * program.places.scale)
+    if not (np.all(np.isfinite(gradient)) and missing.size):
         return []
     lines = []
     row = int(np.argmax(missing))
@@ -180,9 +180,9 @@ def _accuracy(program: Program, solution: Solution, meanings: Meanings, met: boo
         one = meanings.row(row)
         least = f", least of all {one.words}{one.when}" if missing[row] > 0 else ""
         lines.append(f"Conditions are met within {missing[row]:.2g} of their size{least}")
-    one = meanings.unknown(int(np.argmax(slope)))
+    one = meanings.unknown(int(np.argmax(gradient)))
     lines.append(
-        f"The objective could still change by about {np.max(slope):.2g} where {one.words} changes by {one.size:.3g}"
+        f"The objective could still change by about {np.max(gradient):.2g} where {one.words} changes by {one.size:.3g}"
         f"{' ' + one.unit if one.unit else ''}{one.when}; 0 would be an optimum"
     )
     return [f"{line}." for line in lines]

@@ -87,8 +87,8 @@ def _dependent(built: Built, phase: Phase, ends: dict[int, float]) -> list[int]:
             continue
         columns = np.zeros((sizes.size, 0))
         for now in inputs.T:
-            slopes = np.array(moves(place, now, length))
-            columns = np.hstack([slopes[:, : sizes.size] @ columns, slopes[:, sizes.size :]])
+            jacobian = np.array(moves(place, now, length))
+            columns = np.hstack([jacobian[:, : sizes.size] @ columns, jacobian[:, sizes.size :]])
             place = step(place, now, length)
         scaled = columns * np.tile([*widths, length], segments) / sizes[:, None]
         return [sorted(ends)[k] for k in _decided(_unmoved(scaled[sorted(ends)]))]

@@ -15,7 +15,7 @@ from gantrytau_optimica.failures.elastic import Elastic, Soft, soft_conditions
 from gantrytau_optimica.solving.ipopt import WORDS, Solution
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 SMALL = 1e-6  # of its size: what gives way by less holds
 SINGLE = 4  # conditions that are tried alone
@@ -108,7 +108,7 @@ def relax(built: Built, program: Program, solution: Solution, seconds: float = 5
 def _other_duration(program: Program, w: np.ndarray, end: float) -> Concession | None:
     """The nearest final time, where it is a fixed number, at which all other conditions hold; None if there is none."""
     problem = program.problem
-    (phase, *others), (layout, *_) = problem.phases, program.places.layouts
+    phase, *others = problem.phases
     fixed = phase.start_time.is_constant() and phase.final_time.is_constant()
     if (
         others
@@ -122,21 +122,11 @@ def _other_duration(program: Program, w: np.ndarray, end: float) -> Concession |
     symbol, span = ca.SX.sym("final_time"), stop - start
     number = FreeNumber("final_time", symbol, start + 1e-3 * span, start + 1e3 * span, stop)
     changed = replace(problem, phases=(replace(phase, final_time=symbol),), free=(*problem.free, number))
-    variant = transcribe(changed, [layout.mesh], layout.scheme)
+    variant = transcribed_again(program, changed)
     place = len(problem.free)
     name = f"final_time = {stop:g}"
-    soft = Soft(
-        name,
-        False,
-        np.array([place]),
-        stop,
-        stop,
-        span,
-        variant.places.scale[place],
-        1.0,
-        np.array([np.nan]),
-        -1,
-    )
+    scale, where, never = variant.places.scale[place], np.array([place]), np.array([np.nan])
+    soft = Soft(name, False, where, stop, stop, span, scale, 1.0, never, -1)
     found = Elastic(variant, [soft]).solve(np.insert(w, place, stop), [0], end)
     if found is None or found[1][0] < SMALL:
         return None

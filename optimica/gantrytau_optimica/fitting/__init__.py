@@ -1,1 +1,1 @@
-"""What fits leave of their data, looked at alike for all of them."""
+"""Least squares that all fits share: step, blocks, rank, robust weights, covariance, and what they leave of their data."""

@@ -1,6 +1,6 @@
 """One look at what a fit leaves, the same for every fit: `diagnose`.
 
-e: what is left; X: slopes by what was fitted; x: a known signal, beside X
+e: what is left; X: Jacobian by what was fitted; x: a known signal, beside X
 explained   F = (|y|^2 - |e|^2) / k / (|e|^2 / (n - k))           n: rows that count as independent
 size        chi^2 = sum (e / told)^2
 whiteness   r = sum e_i e_(i+1) / |e|^2,      deviation 1 / sqrt(N)
@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, independent_share, product_covariance
+from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.facts import Fact
 from gantrytau_optimica.fitting.finding import Finding, rows_in_words
 from gantrytau_optimica.fitting.robust import limit, robust_deviation, without_strays
@@ -36,7 +36,7 @@ class ResidualSeries:
     """What a fit leaves of one quantity in one run, in the order in which it was measured.
 
     name: of the quantity, the same in all runs; left: measured less model (N,), NaN in rows that do not count; measured:
-    what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: slopes of the model by what was
+    what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: derivatives of it by what was
     fitted (N, k); signals: known ones (N,) that it may follow, "q of x", "v of x", "a of x", "sign v of x", "1", "time" in
     s, "poses": their numbers, or "rate": that of the measured; groups: labels (N,) by kind, "pose", "image", "run",
     "sensor"; rows: their numbers in the data; run: its name, where there are several; band: share of the frequencies that a
@@ -111,7 +111,7 @@ class _Quantity:
 
     @cached_property
     def jacobian(self) -> np.ndarray:
-        """An orthonormal base of the slopes."""
+        """An orthonormal base of the Jacobian."""
         parts = [np.zeros((len(s.left), 0)) if s.jacobian is None else s.jacobian for s in self.series]
         J = np.concatenate([part[s.used] for s, part in zip(self.series, parts, strict=True)])
         sizes = np.linalg.norm(J, axis=0)

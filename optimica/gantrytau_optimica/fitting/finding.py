@@ -1,25 +1,75 @@
-"""Something noticed of data or of a fit, as a record with rows and words."""
+"""Something noticed of data or of a fit: kind, rows, and a sentence that is put together when it is printed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 
 SHOWN = 8  # rows, or ranges of them, that a message lists
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of data in a sentence, "rows 3 and 4", or the lines of the file in which they stand.
+
+    of: how many rows there are, where "all but row 3" may be said; lines: of all rows, (N,).
+    """
+
+    rows: Sequence[int] | np.ndarray
+    of: int | None = None
+    lines: np.ndarray | None = None
+
+    def __str__(self) -> str:
+        text = rows_in_words(self.rows, self.of)
+        if self.lines is None:
+            return text
+        but = "all but " if text.startswith("all but") else ""
+        rows = np.setdiff1d(np.arange(len(self.lines)), self.rows) if but else np.asarray(self.rows)
+        return but + rows_in_words(self.lines[rows]).replace("row", "line", 1)
+
+
+Part = str | Given | Rows
+
+
 @dataclass(frozen=True)
 class Finding(Record):
-    """Something noticed: kind, such as "duplicates" or "millimetres"; rows from 0; a sentence."""
+    """Something noticed: kind, such as "duplicates" or "millimetres"; rows from 0; a sentence, or its parts."""
 
     kind: str
     rows: np.ndarray = field(repr=False)
-    message: str
+    sentence: str | Sequence[Part]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The sentence in parts: text, rows, and arguments of the called function."""
+        return (self.sentence,) if isinstance(self.sentence, str) else tuple(self.sentence)
+
+    @property
+    def message(self) -> str:
+        """The sentence."""
+        return "".join(map(str, self.parts))
+
+    def in_lines(self, lines: np.ndarray) -> Self:
+        """The same with lines of a file, (N,) for all rows, in place of rows."""
+        return replace(self, sentence=in_lines(self.parts, self.rows, lines))
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.message}"
+
+    def __repr__(self) -> str:
+        return f"Finding(kind={self.kind!r}, message={self.message!r})"
+
+
+def in_lines(parts: Sequence[Part], rows: np.ndarray, lines: np.ndarray) -> list[Part]:
+    """A sentence with lines in place of rows; a few rows that it does not name are added at its end."""
+    named = any(isinstance(part, Rows) for part in parts)
+    found = [replace(part, lines=lines) if isinstance(part, Rows) else part for part in parts]
+    few = not named and 0 < len(rows) < len(lines) / 4
+    return [*found, " (", Rows(rows, lines=lines), ")"] if few else found
 
 
 def rows_in_words(rows: Sequence[int] | np.ndarray, of: int | None = None) -> str:
@@ -60,3 +110,8 @@ def agreeing(rows: Sequence[int] | np.ndarray, verb: str) -> str:
     """A verb for rows, "repeat", in the singular where it is one row."""
     one = {"are": "is", "they are": "it is", "go": "goes"}
     return verb if len(rows) != 1 else one.get(verb, f"{verb}s")
+
+
+def length_text(length: float) -> str:
+    """A length in micrometres or millimetres, whichever reads better."""
+    return f"{length * 1e6:.3g} um" if length < 1e-3 else f"{length * 1e3:.3g} mm"

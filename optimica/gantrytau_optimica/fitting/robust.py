@@ -1,4 +1,9 @@
-"""Sizes of errors that strays do not move."""
+"""Sizes of residuals that strays do not move, and weights that strays lose.
+
+s = 1.4826 median |e|          standard deviation of e where noise is normal (Huber, 1981)
+Huber   w = min(1, k / |u|)    u = e / s; the weight of u^2, linear beyond k
+Tukey   sqrt w = 1 - (u / c)^2 for |u| < c, else 0: gross errors do not count
+"""
 
 import numpy as np
 
@@ -6,7 +11,7 @@ NORMAL = 1.4826  # standard deviation over median deviation of a normal distribu
 OUTLIER = 7.0  # robust standard deviations; of 100,000 normal errors the largest has 4.5
 CHANCE = 1e-6  # that noise of few values exceeds the limit
 ROUNDS = 10  # of weighing anew
-BISQUARE = 4.685  # robust deviations, from which errors do not count: 95 % as efficient where noise is normal
+HUBER, BISQUARE = 1.345, 4.685  # deviations k and c: 95 % as efficient as squares where noise is normal
 
 
 def limit(freedom: float) -> float:
@@ -21,8 +26,23 @@ def robust_deviation(left: np.ndarray, taken: int = 0) -> float:
     return NORMAL * float(np.median(np.abs(left))) * float(np.sqrt(len(left) / max(len(left) - taken, 1)))
 
 
+def robust_deviations(left: np.ndarray, axis: int = 0) -> np.ndarray:
+    """The same along an axis of an array."""
+    return NORMAL * np.median(np.abs(left), axis=axis)
+
+
+def huber_weights(sizes: np.ndarray, beyond: float = HUBER) -> np.ndarray:
+    """Weights of squares, at most 1, of residuals of such sizes in deviations."""
+    return np.minimum(1.0, beyond / np.maximum(np.abs(sizes), 1e-300))
+
+
+def tukey_roots(sizes: np.ndarray) -> np.ndarray:
+    """Roots of Tukey's weights, the factors of residuals of such sizes in deviations."""
+    return np.maximum(1 - (sizes / BISQUARE) ** 2, 0.0)
+
+
 def without_strays(left: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-    """What a fit that strays do not lead would leave (N,), from what least squares leave (N,) and their slopes (N, k).
+    """What a fit that strays do not lead would leave (N,), from what least squares leave (N,) and their Jacobian (N, k).
 
     Tukey's bisquare from the median of the amounts, to first order.
     """
@@ -34,7 +54,7 @@ def without_strays(left: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
     for _ in range(ROUNDS):
         if not scale > 0:
             break
-        weights = np.maximum(1 - (found / (BISQUARE * scale)) ** 2, 0.0)  # the root of Tukey's
+        weights = tukey_roots(found / scale)
         step = np.linalg.lstsq(X * weights[:, None], left * weights, rcond=1e-9)[0]
         found = left - X @ step
         scale = robust_deviation(found, X.shape[1])

@@ -91,14 +91,7 @@ class Rig:
         stops.
         """
         whole("Rig.run", "seed", seed, least=0)
-        q_ref = array("Rig.run", "position", position, (None, len(self.joints)))
-        if len(q_ref) < 2:
-            raise ModelError(
-                "found one row of position, expected two at least", place="Rig.run", argument="position"
-            )
-        v_ref = (
-            np.zeros_like(q_ref) if velocity is None else array("Rig.run", "velocity", velocity, q_ref.shape)
-        )
+        q_ref, v_ref = self._references(position, velocity)
         random = np.random.default_rng(seed)
         t = self.period * np.arange(len(q_ref))
         loop, forces = self._at_rest(q_ref[0])
@@ -173,6 +166,17 @@ class Rig:
             if law is not None:
                 still |= {f"robot.{law}.level": 1.0, f"robot.{law}.z_0": 0.0}
         return loop, still | {f"controllers[{k}].f_ff": float(force) for k, force in enumerate(forces)}
+
+    def _references(self, position: ArrayLike, velocity: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
+        q_ref = array("Rig.run", "position", position, (None, len(self.joints)))
+        if len(q_ref) < 2:
+            raise ModelError(
+                "found one row of position, expected two at least", place="Rig.run", argument="position"
+            )
+        v_ref = (
+            np.zeros_like(q_ref) if velocity is None else array("Rig.run", "velocity", velocity, q_ref.shape)
+        )
+        return q_ref, v_ref
 
     def __repr__(self) -> str:
         n = len(self.joints)

@@ -25,7 +25,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Real, StateSelect, der
-from gantrytau.border.refusal import USERS_ERRORS
+from gantrytau.border.checks import array, instance, number
+from gantrytau.border.refusal import USERS_ERRORS, Given
 from gantrytau.describing.record import Record
 from gantrytau.language.declarations import Formula
 from gantrytau.whole_files import replacing
@@ -48,7 +49,6 @@ from gantrytau_optimica.paths.points import (
     coordinates,
     corner_error,
     direction,
-    positive,
     turns,
     words,
 )
@@ -129,9 +129,11 @@ class Path(Record):
         name = "Path.through"
         found = checked_points(name, points)
         if closed:
-            found = closed_points(name, found, start_direction, end_direction, blend)
+            ends = dict(start_direction=start_direction, end_direction=end_direction)
+            found = closed_points(name, found, **ends, blend=blend)
         check_different(name, found)
-        directions = [direction(name, d, found.shape[1]) for d in (start_direction, end_direction)]
+        begin = direction(name, "start_direction", start_direction, found.shape[1])
+        end = direction(name, "end_direction", end_direction, found.shape[1])
         angles = turns(np.vstack([found, found[1:2]]) if closed else found)
         if np.any(angles > SHARP) and blend is None:
             advice = "give points closer together if the curve is smooth there, round its corners with blend=0.01 (m)"
@@ -141,8 +143,8 @@ class Path(Record):
         rows = [0, *(np.flatnonzero(angles > SHARP) + 1), len(found) - 1]
         arcs = []
         for k, (a, b) in enumerate(pairwise(rows)):
-            ends = directions[0] if k == 0 else None, directions[1] if k == len(rows) - 2 else None
-            arcs.append(by_length(spline(found[a : b + 1], *ends, closed), ACCURACY, name))
+            first, last = begin if k == 0 else None, end if k == len(rows) - 2 else None
+            arcs.append(by_length(spline(found[a : b + 1], first, last, closed), ACCURACY, name))
         return cls._rounded(name, arcs, found, rows, angles, blend)
 
     @classmethod
@@ -169,11 +171,8 @@ class Path(Record):
         Raises ModelError for what is no such function, and for a curve with corners or jumps.
         """
         name = "Path.of"
-        ends = np.array([start, stop], dtype=float)
-        if not np.all(np.isfinite(ends)) or not start < stop:
-            raise ModelError(
-                f"{name}: found start={start!r}, stop={stop!r}, expected two finite numbers in this order"
-            )
+        begin = number(name, "start", start)
+        end = number(name, "stop", stop, above=begin)
         u = ca.SX.sym("u")
         try:
             column = coordinates(function(u))
@@ -188,7 +187,7 @@ class Path(Record):
             raise ModelError(f"{name}: found {column.numel()} coordinates, expected two or three, in m")
         curve = Curve(
             lambda at: np.array([np.array(d).T for d in evaluate(at[None, :])]),
-            np.linspace(ends[0], ends[1], 5),
+            np.linspace(begin, end, 5),
         )
         return cls(by_length(curve, ACCURACY, name))
 
@@ -204,7 +203,7 @@ class Path(Record):
         name = "Path.recorded"
         found = checked_points(name, points, FEWEST, "; Path.through takes few")
         if tolerance is not None:
-            positive(name, "tolerance", tolerance)
+            number(name, "tolerance", tolerance, unit="m", above=0.0)
         if np.ptp(found, axis=0).max() == 0.0:
             raise ModelError(f"{name}: all {len(found)} points are the same, expected a way; record a motion")
         made = smoothed(found, tolerance, ACCURACY, name)
@@ -230,7 +229,7 @@ class Path(Record):
         """Arcs between corners at the given rows, joined."""
         if len(arcs) == 1:
             return cls(arcs[0])
-        distance = positive(name, "blend", blend)
+        distance = number(name, "blend", blend, unit="m", above=0.0)
         inner = [int(row) for row in rows[1:-1]]
         back = [row for row in inner if angles[row - 1] > BACK]
         if back:
@@ -304,16 +303,14 @@ class Path(Record):
 
     def derivative(self, s: Any, order: int = 1) -> Array:
         """The derivative by s of this order, in m^(1 - order), at lengths s (k,) in m, (k, d)."""
-        found = np.atleast_1d(np.asarray(s, dtype=float))
-        if found.ndim != 1:
-            raise ModelError(
-                f"Path: found lengths of shape {found.shape}, expected a number or an array (k,), in m"
-            )
+        found = np.atleast_1d(array("Path", "s", s, (), (None,), unit="m", finite=False))
         slack = 1e-9 * self.length
         wrong = found[~((found >= -slack) & (found <= self.length + slack))]
         if wrong.size:
             raise ModelError(
-                f"Path: found s = {wrong[0]:.6g} m, expected 0 to {self.length:.6g} m, the length of the path"
+                f"found s = {wrong[0]:.6g} m, expected 0 to {self.length:.6g} m, the length of the path",
+                place="Path",
+                argument="s",
             )
         return self.pieces.derivative(found, order)
 
@@ -386,11 +383,9 @@ class Way(Model):
     r = Real(3, unit="m", description="place, resolved as the path's points are")
 
     def __init__(self, path: Path, **modifications: Any):
-        if not isinstance(path, Path) or path.dimension != 3:
-            raise ModelError(
-                f"Way: found {path!r}, expected a Path in space; make one with Path.through(points)"
-            )
-        self.path = path
+        self.path = instance("Way", "path", path, Path, "a Path in space; make one with Path.through(points)")
+        if path.dimension != 3:
+            raise ModelError("expected a Path in space", place="Way", found=Given("path", path))
         super().__init__(dict(s=dict(start=path.length / 2, min=0.0, max=path.length)), **modifications)
 
     def equations(self):

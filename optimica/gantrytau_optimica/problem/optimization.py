@@ -15,6 +15,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import Model, ModelError, Parameter, Samples
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import Given
 from gantrytau.flattening.shapes import numpy_shape
 
 
@@ -138,11 +140,12 @@ def link(first: Optimization, second: Optimization, *, jump: Sequence[str] = ())
     jump: names within the phase that do not, as "ball.v" after a contact. A free start time of the second phase
     is the final time of the first.
     """
-    for which in (first, second):
-        if not isinstance(which, Optimization):
-            raise ModelError(f"link: found {which!r}, expected two phases: components that are Optimizations")
+    for argument, phase in (("first", first), ("second", second)):
+        instance("link", argument, phase, Optimization, "a phase: a component that is an Optimization")
     if isinstance(jump, str):
-        raise ModelError(f"link: found jump='{jump}', expected a list of names; write ['{jump}']")
+        raise ModelError(
+            f"expected a list of names; write ['{jump}']", place="link", found=Given("jump", jump)
+        )
     return PhaseLink(first, second, tuple(jump))
 
 
@@ -166,8 +169,7 @@ def _target(words: str, expression: Any, samples: Samples, integrated: bool) -> 
     asked = _asked.get()
     if asked is None:
         raise ModelError(f"{words} was used outside of an optimisation problem; use it in objective()")
-    if not isinstance(samples, Samples):
-        raise ModelError(f"{words}: found {samples!r}, expected Samples(times, values)")
+    instance(words, "samples", samples, Samples, "Samples(times, values)")
     expression = _signals(words, expression, asked.points)
     if expression.numel() == samples.values.shape[1]:
         samples.check_shape(words, numpy_shape(expression))

@@ -8,11 +8,12 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import Model, ModelError, Result
+from gantrytau.border.checks import number
 from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.procedure.documents.files import plan_on_file, write_plan
-from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.documents.rapid import OPERATOR, RapidOptions, rapid_program
 from gantrytau_optimica.procedure.monte_carlo import matched, placed
 from gantrytau_optimica.procedure.motion_planning.plan_motion import plan_motion
 from gantrytau_optimica.procedure.motion_planning.tours import Roadmap, find_tour
@@ -41,9 +42,7 @@ class CalibrationPlan(PosePlan):
         only tells and goes on after `measure`, and so does the name of a digital output, which gets a pulse too; tool:
         name of its tool data. Raises ModelError for words that RAPID does not take.
         """
-        return rapid_program(
-            self, name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
-        )
+        return rapid_program(self, RapidOptions(name, speed, settle, measure, carts, trigger, tool))
 
     def motion(self, *, speed: float = 0.1, rest: float = 3.0) -> Result:
         """The nominal robot on its way through the poses, which `animate(plan)` shows, with obstacles and places to measure.
@@ -56,13 +55,10 @@ class CalibrationPlan(PosePlan):
                 f"motion: found a plan of {self.robot_name} that was loaded without it, expected its robot; "
                 "load_plan(folder, robot, limits)"
             )
-        for name, value, least in (("speed", speed, 1e-3), ("rest", rest, 0.0)):
-            if not (isinstance(value, (int, float)) and least <= value < np.inf):
-                raise ModelError(
-                    f"motion.{name}: found {value!r}, expected a number from {least:g}", argument=name
-                )
+        number("motion", "speed", speed, least=1e-3)
+        number("motion", "rest", rest, least=0.0)
         fleet = self.cell.fleet.with_limits(self.cell.limits)
-        return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, float(speed), float(rest))
+        return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, speed, rest)
 
     def write(self, folder: str | Path, **program: Any) -> Path:
         """Write workspace.png, poses.csv, measurements-template.csv, plan.json, plan.html and the program into a folder.
@@ -71,7 +67,7 @@ class CalibrationPlan(PosePlan):
         program: as of `program`; its name is that of the file, Calibration.mod. Returns the folder, which is made where
         it does not exist; ModelError where the folder around it does not.
         """
-        return write_plan(self, Path(folder), program)
+        return write_plan(self, Path(folder), RapidOptions(**program))
 
     def placed(self, measurements: Measurements) -> Measurements:
         """Measurements in any frame, such as the axes of the device, laid over the poses that are expected, by their q."""

@@ -2,28 +2,29 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import permutations
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import check_words
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.assessment.calibration_acceptance import (
     CalibrationVerdict,
     judge,
     told_by_tool,
-    um,
 )
 from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
+from gantrytau_optimica.calibration.data.mistakes import mistakes
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.tool_error import ToolError, tool_error
-from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.finding import Finding, length_text
 from gantrytau_optimica.procedure.calibration_plan import load_plan
 from gantrytau_optimica.procedure.cells.planned_cell import PROGRAM, PlannedCell
 from gantrytau_optimica.procedure.monte_carlo import matched
@@ -107,8 +108,9 @@ class MeasuredPlan(Record):
             yield Finding(
                 "noise",
                 found.rows,
-                f"what is left needs noise of {um(found.noise)} in each coordinate, {um(foretold)} are foretold of the "
-                "device; look at the other findings, at its settings, and whether robot and target stood still",
+                f"what is left needs noise of {length_text(found.noise)} in each coordinate, {length_text(foretold)} are "
+                "foretold of the device; look at the other findings, at its settings, and whether robot and target stood "
+                "still",
             )
 
     @property
@@ -157,10 +159,7 @@ def measured_plan(
     that the plan expects; positions that fit it in no frame stay as they are. Raises ModelError where actuators are not
     those of planned poses, positions are mirrored, those of the plan itself, or not in the base where they are said to be.
     """
-    if frame not in (None, *get_args(Frame)):
-        raise ModelError(
-            f"measured_plan: found frame={frame!r}, expected 'fitted' or 'base'", argument="frame"
-        )
+    check_words(measured_plan, locals())
     chosen: Frame = frame or planned.cell.frame
     data = measurements.select(np.flatnonzero(~np.isnan(measurements.r).all(axis=1)))
     plan, rows = planned.plan, _rows(planned, data)
@@ -178,7 +177,11 @@ def measured_plan(
     if chosen == "base":
         raise ModelError(
             f"found positions {min(as_tool, as_target):.3g} m off the poses of the plan beside it in the median, expected "
-            f"{near:.3g} m at most where frame='base'; take frame='fitted' for another frame",
+            f"{near:.3g} m at most where ",
+            Given("frame", "base"),
+            "; take ",
+            Given("frame", "fitted"),
+            " for another frame",
             argument="frame",
         )
     placed = plan.placed(data)
@@ -229,11 +232,10 @@ def _rows(planned: PlannedCell, data: Measurements) -> np.ndarray:
     good = data.finite
     if np.count_nonzero(rows[good] >= 0) >= min(FEW, np.count_nonzero(good)):
         return rows
-    words = next((words for words, other in _mistakes(q) if np.mean(matched(other, expected) >= 0) > 0.5), "")
-    remedy = words or "q1, q2, ... must be those of poses.csv"
+    words = _mistake(data, expected, plan.carts) or "q1, q2, ... must be those of poses.csv"
     raise ModelError(
-        f"found no actuator positions of the plan beside it; {remedy}; for measurements of other poses name the robot, "
-        f"robot='{planned.cell.name}'"
+        f"found no actuator positions of the plan beside it; {words}; for measurements of other poses name the robot, ",
+        Given("robot", planned.cell.name),
     )
 
 
@@ -255,22 +257,13 @@ def _by_number(planned: PlannedCell, data: Measurements) -> np.ndarray:
     return np.where(off > FAR, -1, rows)
 
 
-def _mistakes(q: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-    """What may have been done to q, and q with that undone."""
-    yield "they are in mm, expected m", q * 1e-3
-    columns = range(q.shape[1])
-    for order in permutations(columns) if len(columns) <= FEW else _swaps(len(columns)):
-        words = [f"q{k + 1} stands in column q{c + 1}" for k, c in enumerate(order) if k != c]
-        if words:
-            yield ", ".join(words), q[:, list(order)]
-
-
-def _swaps(count: int) -> Iterator[list[int]]:
-    for i in range(count):
-        for k in range(i + 1, count):
-            order = list(range(count))
-            order[i], order[k] = k, i
-            yield order
+def _mistake(data: Measurements, expected: np.ndarray, carts: int) -> str:
+    """The mistake in q alone without which most rows are planned poses; nothing where there is none."""
+    for mistake in mistakes(carts, data.q.shape[1] - carts, turns=False):
+        q, r, _ = mistake.undo(data.q, data.r, None)
+        if np.array_equal(r, data.r, equal_nan=True) and np.mean(matched(q, expected) >= 0) > 0.5:
+            return f"undo this: {mistake.words}"
+    return ""
 
 
 def _told(q: np.ndarray) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import GantryTauError, ModelError
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import motion
 from gantrytau_optimica.calibration.calibrate import calibrate
@@ -140,15 +141,16 @@ def check_device(fleet: Fleet, device: Device) -> None:
     found = device.measure(home.r[None], home.R[None])
     if found.r is None:
         raise ModelError(
-            f"plan_calibration.device: found {type(device).__name__}, which finds no position, expected one that does; "
-            "take a LaserTracker, a TMac or cameras",
-            argument="device",
+            "which finds no position, expected a device that does; take a LaserTracker, a TMac or cameras",
+            place="plan_calibration",
+            found=Given("device", type(device).__name__),
         )
     if fleet.nominal.turns and found.R is None:
         raise ModelError(
-            f"plan_calibration.device: found {type(device).__name__} for a robot with {fleet.kind}, expected one that finds "
-            "orientations too; take a TMac or cameras, or plan for the robot with three links",
-            argument="device",
+            f"expected a device that finds orientations too for a robot with {fleet.kind}; take a TMac or cameras, or plan "
+            "for the robot with three links",
+            place="plan_calibration",
+            found=Given("device", type(device).__name__),
         )
 
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau import GantryTauError
-from gantrytau_optimica.calibration.assessment.calibration_acceptance import Verdict, um
+from gantrytau_optimica.calibration.assessment.calibration_acceptance import Verdict
 from gantrytau_optimica.calibration.design.pose_selection import enough_poses, predict
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.monte_carlo import Trials
 from gantrytau_optimica.procedure.plan_goal import PlanGoal
@@ -57,10 +58,10 @@ def _told(trials: Trials, count: int, wanted: float) -> str:
     robots = f"{len(trials)} simulated robots" if len(trials) > 1 else "the simulated robot"
     if trials.failed:
         return f"Of {robots} {trials.failed} could not be calibrated with {count} poses."
-    before = f"from {um(float(trials.before.mean()))} before"
+    before = f"from {length_text(float(trials.before.mean()))} before"
     return (
-        f"With {count} poses the tool of {robots} errs by {um(float(trials.after.mean()))} in the mean over the "
-        f"workspace, of the worst robot by {um(trials.worst)} ({before}); wanted are {um(wanted)}."
+        f"With {count} poses the tool of {robots} errs by {length_text(float(trials.after.mean()))} in the mean over the "
+        f"workspace, of the worst robot by {length_text(trials.worst)} ({before}); wanted are {length_text(wanted)}."
     )
 
 
@@ -70,16 +71,17 @@ def _failed(device: Device, trials: Trials, count: int, wanted: float) -> str:
     if trials.misread > wanted:
         return (
             f"{said} Even when 25 readings of each pose are averaged the {type(device).__name__} errs by "
-            f"{um(trials.misread)}, which is systematic: calibrate the device itself, place it nearer, or take a better one."
+            f"{length_text(trials.misread)}, which is systematic: calibrate the device itself, place it nearer, or take a "
+            "better one."
         )
     return f"{said} Plan more than {count} poses, or measure the robot better by hand first."
 
 
 def _systematic(device: Device, trials: Trials) -> str:
     return (
-        f"{um(trials.averaged)} remain even when 25 readings of each pose are averaged, so that the error is systematic "
-        f"in the {type(device).__name__} and more poses do not help: calibrate the device itself, place it nearer to the "
-        "middle of the workspace, or take a better one."
+        f"{length_text(trials.averaged)} remain even when 25 readings of each pose are averaged, so that the error is "
+        f"systematic in the {type(device).__name__} and more poses do not help: calibrate the device itself, place it "
+        "nearer to the middle of the workspace, or take a better one."
     )
 
 
@@ -116,7 +118,7 @@ def _noise(
     factor = trials.worst / wanted
     return (
         f"All {len(usable.q)} visible places together are not enough: take a device with {factor:.2g} times less noise than "
-        f"{um(choice.noise)} per axis, or average several readings of each pose."
+        f"{length_text(choice.noise)} per axis, or average several readings of each pose."
     )
 
 
@@ -152,7 +154,7 @@ def _remarks(
     if not trials.failed and times > 2:
         found.append(
             f"Errors are {times:.0f} times those predicted from noise alone "
-            f"({um(choice.error)}): part of them is systematic."
+            f"({length_text(choice.error)}): part of them is systematic."
         )
     if trials.unseen.any():
         found.append(f"In {np.count_nonzero(trials.unseen)} robots some poses were not seen.")

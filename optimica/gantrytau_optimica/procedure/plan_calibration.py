@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Model, ModelError
+from gantrytau import Model
+from gantrytau.border.checks import array, instance, number, whole
 from gantrytau.ensembles.parallel_map import each
 from gantrytau.kinematics import Limits, workspace
 from gantrytau.kinematics.workspace.grid_spacing import checked_places
@@ -36,8 +37,8 @@ from gantrytau_optimica.procedure.robot_samples import Fleet, build_fleet, check
 from gantrytau_optimica.procedure.stages import Progress, Stages, digest
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
 
-LARGEST_TAPE = 0.1  # m; what is larger was written in mm
-LARGEST_WANTED = 0.1
+NAME = "plan_calibration"
+LARGEST = 0.1  # m, of errors and margins; what is larger was written in mm
 
 
 def plan_calibration(
@@ -77,11 +78,25 @@ def plan_calibration(
     interruption; stages whose questions changed are done anew. progress: called with
     (stage, done, of). Raises ModelError for what does not fit, where nothing is visible or safe, or home is in a collision.
     """
-    _check_numbers(wanted=wanted, tape=tape, margin=margin, robots=robots)
-    _check_kinds(limits, device)
+    wanted = number(NAME, "wanted", wanted, above=0.0, most=LARGEST, unit="m")
+    tape = number(NAME, "tape", tape, above=0.0, most=LARGEST, unit="m")
+    margin = number(
+        NAME, "margin", margin, above=0.0, below=LARGEST
+    )  # without one no way is shown to be clear
+    spacing = None if spacing is None else number(NAME, "spacing", spacing, above=0.0, unit="m")
+    for name, value, least in (
+        ("robots", robots, 1),
+        ("seed", seed, 0),
+        ("poses", poses, FEWEST),
+        ("places", places, 1),
+    ):
+        if value is not None or name != "places":
+            whole(NAME, name, value, least=least)
+    instance(NAME, "limits", limits, Limits, "gantrytau.kinematics.Limits(strokes=..., ...)")
+    instance(NAME, "device", device, Device, "a device such as LaserTracker((4.0, 3.0, 0.0))")
     path = None if folder is None else Path(folder)
     if path is not None:
-        check_folder("plan_calibration.folder", path)
+        check_folder(NAME, path)
         path.mkdir(exist_ok=True)
     fleet = build_fleet(robot, limits, tape=tape, robots=robots, seed=seed)
     _check_poses(fleet, poses)
@@ -223,67 +238,20 @@ def _stricter(limits: Limits, margin: float) -> Limits:
 
 def _home(fleet: Fleet, home: Any) -> np.ndarray:
     joints = fleet.nominal.kinematics.joints
-    found = np.asarray(fleet.nominal.linked.home.q if home is None else home, dtype=float)
-    if found.shape != (len(joints),) or not np.isfinite(found).all():
-        raise ModelError(
-            f"plan_calibration.home: found {home!r}, expected {len(joints)} finite numbers in m and rad, for "
-            f"{', '.join(joints)}",
-            argument="home",
-        )
+    found = array(NAME, "home", fleet.nominal.linked.home.q if home is None else home, (len(joints),))
     return commanded(found[None])[0]
-
-
-def _check_numbers(*, wanted: Any, tape: Any, margin: Any, robots: Any) -> None:
-    for name, value, most in (("wanted", wanted, LARGEST_WANTED), ("tape", tape, LARGEST_TAPE)):
-        if not (isinstance(value, (int, float)) and 0 < value <= most):
-            raise ModelError(
-                f"plan_calibration.{name}: found {value!r}, expected a length in m above 0 and up to {most:g}; write 5 "
-                "mm as 0.005, 200 um as 200e-6",
-                argument=name,
-            )
-    if not (isinstance(margin, (int, float)) and 0 < margin < LARGEST_TAPE):
-        raise ModelError(
-            f"plan_calibration.margin: found {margin!r}, expected a length in m above 0 and below {LARGEST_TAPE:g}; "
-            "without one no way can be shown to be clear",
-            argument="margin",
-        )
-    if not (isinstance(robots, int) and robots >= 1):
-        raise ModelError(
-            f"plan_calibration.robots: found {robots!r}, expected a whole number from 1; 20 are usual",
-            argument="robots",
-        )
 
 
 def _spacing(fleet: Fleet, limits: Limits, spacing: float | None, places: int | None) -> float | None:
     """The spacing that is given, in m, or that of a grid with so many places in the workspace of the nominal robot."""
-    checked_places(places, spacing, "plan_calibration")
+    checked_places(places, spacing, NAME)
     if places is None:
         return spacing
     return workspace(fleet.nominal.kinematics, limits, places=places).spacing
-
-
-def _check_kinds(limits: Any, device: Any) -> None:
-    if not isinstance(limits, Limits):
-        raise ModelError(
-            f"plan_calibration.limits: found {type(limits).__name__}, expected "
-            "gantrytau.kinematics.Limits(strokes=..., ...)",
-            argument="limits",
-        )
-    if not isinstance(device, Device):
-        raise ModelError(
-            f"plan_calibration.device: found {type(device).__name__}, expected a device such as LaserTracker((4.0, 3.0, "
-            "0.0))",
-            argument="device",
-        )
 
 
 def _check_poses(fleet: Fleet, poses: Any) -> None:
     """As many as calibrate() takes to fit all poses."""
     unknowns = {"three links": 7, "six links": 10, "turntables": max(arm.count for arm in fleet.arms) // 3}
     needed = max(FEWEST, unknowns[fleet.kind] + 1)
-    if not (isinstance(poses, int) and poses >= needed):
-        raise ModelError(
-            f"plan_calibration.poses: found {poses!r}, expected a whole number from {needed} for a robot with "
-            f"{fleet.kind}; 40 are usual",
-            argument="poses",
-        )
+    whole(NAME, "poses", poses, least=needed)

@@ -9,8 +9,8 @@ import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
-from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
 from gantrytau_optimica.calibration.devices.devices import Device
+from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.candidates import Candidates
 from gantrytau_optimica.procedure.monte_carlo import Trials
 from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict
@@ -80,12 +80,11 @@ class PosePlan(Record):
             f"  verdict    {'good' if self.verdict.good else 'NOT GOOD ENOUGH'}",
             *(f"             {reason}" for reason in self.verdict.reasons),
             f"  workspace  {self.workspace}",
-            f"  poses      {int(self.measured.sum())} to measure, {passed} only passed, {len(self.lost)} replaced as "
-            "they cannot "
-            "be reached",
-            f"  expected   {um(self.prediction.error)} of the tool by noise of {um(self.prediction.noise)} per axis; "
-            "condition "
-            f"{self.prediction.condition:.3g}, observability {self.prediction.observability:.3g} (Nahvi and Hollerbach)",
+            f"  poses      {int(self.measured.sum())} to measure, {passed} only passed, {len(self.lost)} replaced as they "
+            "cannot be reached",
+            f"  expected   {length_text(self.prediction.error)} of the tool by noise of "
+            f"{length_text(self.prediction.noise)} per axis; condition {self.prediction.condition:.3g}, observability "
+            f"{self.prediction.observability:.3g} (Nahvi and Hollerbach)",
         ]
         return "\n".join(lines)
 

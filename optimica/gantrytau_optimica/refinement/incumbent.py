@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gantrytau import SolveError, heeding_interrupts
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.solving.clock import Clock
 
@@ -92,10 +93,9 @@ class BestSoFar:
         over = TimeoutError(f"{self.clock.passed:.1f} s")
         if self.best is None:
             doing = f" at {self.clock.stage}" if self.clock.stage else ""
-            raise SolveError(
-                f"{self.name}: {LATE}{doing} after {over}, before there was anything to keep; allow more with "
-                "max_time=, or take fewer elements="
-            ) from over
+            early = f"{LATE}{doing} after {over}, before there was anything to keep; allow more with "
+            remedy = Given("max_time"), ", or take fewer ", Given("elements")
+            raise SolveError(early, *remedy, place=self.name) from over
         told = self.best.refinement is not None or self.best.search is not None  # that it was not finished
         if not (self.best.success and told):
             raise self.stopped(LATE) from over

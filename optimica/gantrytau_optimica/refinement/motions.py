@@ -18,7 +18,7 @@ from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
 from gantrytau_optimica.refinement.remesh import divided
 from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 DOUBLED = 3  # times that elements are halved
 DOUBTFUL = 0.1  # of its size: first-order estimate of a state's deviation from which inputs are played back
@@ -55,8 +55,11 @@ def stopped_told(found: Optimum) -> Optimum:
 
 def _missed(found: Optimum) -> str:
     """What inputs miss by more than its size, in words; "" of a motion, or of an answer that is none."""
-    scheme = found.program.places.layouts[0].scheme.scheme
-    if not found.success or scheme == "shooting" or not any(map(_doubtful, found.phases.values())):
+    if (
+        not found.success
+        or not found.program.scheme.refinable
+        or not any(map(_doubtful, found.phases.values()))
+    ):
         return ""
     if not found.playback.complete:  # algebraics may be singular between two points that the solution passes
         plain = not any(one.phase.algebraics for one in found.phases.values())
@@ -87,32 +90,31 @@ def _doubtful(trajectory: Trajectory) -> bool:
         followed = np.linalg.solve(rows[:, n:, n + 1 :], rows[:, n:, : n + 1])
     except np.linalg.LinAlgError:
         return True
-    rows = rows[:, :n, : n + 1] - rows[:, :n, n + 1 :] @ followed  # rates, and their slopes by states
+    rows = rows[:, :n, : n + 1] - rows[:, :n, n + 1 :] @ followed  # rates, and their Jacobian by states
     rows = rows.reshape(mesh.elements, PLACES.size, n, n + 1)
     spans = np.diff(trajectory.times(mesh.borders))[:, None, None]
-    slopes = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
+    jacobian = np.einsum("epij,p->eij", rows[..., 1:], INTEGRALS[-1]) * spans
     x = signals[:n].reshape(n, mesh.elements, PLACES.size).transpose(1, 2, 0)
     rests = x[:, :1] + INTEGRALS @ rows[..., 0] * spans - x
     grown = np.einsum(
-        "epij,epj,p->ei", expm(slopes[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
+        "epij,epj,p->ei", expm(jacobian[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
     )
-    misses = rests[:, -1] + np.einsum("eij,ej->ei", slopes, grown)
+    misses = rests[:, -1] + np.einsum("eij,ej->ei", jacobian, grown)
     sizes = np.array([s.nominal for s in phase.states])
     if np.all(np.abs(misses) <= RESOLVED * sizes):
         return False
     off = np.zeros(n)
-    for growth, miss in zip(expm(slopes), misses, strict=True):
+    for growth, miss in zip(expm(jacobian), misses, strict=True):
         off = growth @ off + miss
     return not np.all(np.abs(off) <= DOUBTFUL * sizes)
 
 
 def _doubled(found: Optimum) -> Program:
     """The program on elements of half the length, inputs in the pieces that they have."""
-    layouts = found.program.places.layouts
-    meshes = [layout.mesh for layout in layouts]
+    meshes = found.program.meshes
     halved = [
         replace(m, borders=divided(m.borders, np.full(m.elements, 2)), moving=tuple(2 * k for k in m.moving))
         for m in meshes
     ]
     problem = with_pieces(found.program.problem, meshes, lambda _, own, mesh: kept_pieces(own, mesh))
-    return transcribe(problem, halved, layouts[0].scheme)
+    return transcribed_again(found.program, problem, halved)

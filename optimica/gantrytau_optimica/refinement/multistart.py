@@ -24,7 +24,7 @@ from gantrytau_optimica.refinement.refinement import without_ramps
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program, first_guess
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 COARSE = 12  # elements, at least, of the mesh on which first guesses are tried
 LOOSE = 1e-4  # tolerance there
@@ -185,7 +185,7 @@ def coarse_program(program: Program, built: Built, ramps_added: bool) -> Program
     )
     pieces = {u.pieces.kind for phase in problem.phases for u in phase.inputs}
     own = any(layout.mesh.moving for layout in layouts) or pieces & {"constant", "linear"}
-    if own or layouts[0].scheme.scheme == "shooting":
+    if own or not program.scheme.refinable:
         return None
     steps = [max(layout.mesh.elements // COARSE, 1) for layout in layouts]
     if max(steps) == 1 and not ramps_added:
@@ -194,4 +194,4 @@ def coarse_program(program: Program, built: Built, ramps_added: bool) -> Program
         Mesh(np.unique(np.append(layout.mesh.borders[::step], 1.0)))
         for layout, step in zip(layouts, steps, strict=True)
     ]
-    return transcribe(problem, meshes, layouts[0].scheme)
+    return transcribed_again(program, problem, meshes)

@@ -16,7 +16,7 @@ from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 MOST_ROUNDS = 12
 MOST_ELEMENTS = 2000
@@ -24,9 +24,8 @@ REPLAYED = 1e-7  # relative: what tolerances of solver and integration leave in 
 ZOOMS = 1  # rounds that look closer at where arcs end, before borders stand there
 WORSE = 1e-3  # relative: an objective by which another branch, or none, was found
 LEAST_CHANGE = 1e-12  # of the objective, by rounding: the mesh is as it was
-SMALL = (
-    30.0  # times the accuracy: defects below which borders may move; above, they would be moved to err more
-)
+# times the accuracy: defects below which borders may move; above, they would be moved to err more
+SMALL = 30.0
 
 
 @dataclass(frozen=True)
@@ -220,13 +219,13 @@ def solved_by_arcs(
     if known:
         problem = with_arcs(problem, trajectories, meshes)
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+    program = transcribed_again(optimum.program, problem, meshes, located)
     held = held_at_limits(program, trajectories) if known else program
     if np.sum(held.lbg == held.ubg) > np.sum(
         held.lbw < held.ubw
     ):  # each arc at a limit leaves less to choose
         problem = without_following(replace(optimum.built, problem=problem))
-        program = transcribe(problem, meshes, optimum.program.places.layouts[0].scheme, located)
+        program = transcribed_again(optimum.program, problem, meshes, located)
         held = held_at_limits(program, trajectories) if known else program
     if np.sum(held.lbg == held.ubg) > np.sum(held.lbw < held.ubw):
         return None
@@ -295,8 +294,7 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
     """The solution on other meshes, from this one, or None if it is not found."""
     trajectories = list(optimum.phases.values())
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    scheme = optimum.program.places.layouts[0].scheme
-    program = transcribe(optimum.program.problem, meshes, scheme, located)
+    program = transcribed_again(optimum.program, meshes=meshes, located=located)
     better = solve(program, warm_start(trajectories, program))
     return better if better.success else None
 

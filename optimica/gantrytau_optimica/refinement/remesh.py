@@ -12,9 +12,8 @@ from gantrytau_optimica.transcription.trajectory import Trajectory
 ORDER = 5  # of the error that an element adds, with three points
 MOST_PARTS = 4
 NEAR = 0.02  # of an element: borders that are closer to a switch give way to it
-ROUGH = (
-    1.0  # times the root of the accuracy: jumps of ramps, by the range of an input, that are smoothed away
-)
+# times the root of the accuracy: jumps of ramps, by the range of an input, that are smoothed away
+ROUGH = 1.0
 PROVEN = 800  # elements, from which on a mesh is not divided only to prove itself
 LEAST = 5e-4  # of the horizon: shorter elements hardly move the objective, and the solver crawls
 SAME = 1e-4  # of the horizon: switches that are closer count as one

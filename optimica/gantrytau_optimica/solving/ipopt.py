@@ -63,10 +63,10 @@ BARRIERS: dict[Barrier, dict[str, Any]] = {
 }
 
 SLOPE = 1.0  # what the objective changes by when all unknowns change by their sizes: smaller ones are scaled up to it
-STEEP = 1e2  # slopes by one unknown are scaled down to this
+STEEP = 1e2  # derivatives by one unknown are scaled down to this
 FEW = 1e2  # times an objective of few unknowns is scaled up
-ALONE = 3.0  # unknowns that share its slope: fewer are few
-FLAT = 1e-6  # of the slopes beside the guess: those at the guess vanish by accident
+ALONE = 3.0  # unknowns that share its gradient: fewer are few
+FLAT = 1e-6  # of the gradient beside the guess: that at the guess vanishes by accident
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,13 +238,13 @@ def finite(program: Program, w: np.ndarray) -> bool:
 
 def objective_size(program: Program) -> float:
     """By how much the objective changes when all unknowns change by their sizes from the guess, to first order;
-    from beside the guess, where its slopes vanish there.
+    from beside the guess, where its gradient vanishes there.
     """
-    return float(np.sum(_objective_slopes(program)[1]))
+    return float(np.sum(_objective_gradient(program)[1]))
 
 
-def _objective_slopes(program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Finite slopes of the objective by scaled unknowns at the guess, and those that tell its size."""
+def _objective_gradient(program: Program) -> tuple[np.ndarray, np.ndarray]:
+    """Finite derivatives of the objective by scaled unknowns at the guess, and those that tell its size."""
     x = first_guess(program) / program.places.scale
     beside = np.clip(x + 0.5 * np.sin(1.0 + 7.3 * np.arange(x.size)), program.lbw, program.ubw)
     at_guess, near = (
@@ -258,13 +258,13 @@ def _objective_scale(program: Program, few: float) -> float:
     """A factor that makes an objective neither so flat that any point is taken for its optimum, nor so steep that none is.
 
     few: what an objective of few unknowns is scaled up by. The time of a motion is one unknown: what all limits together
-    are worth is its slope, each of them so little that the barrier vanishes long before those that bind are found.
+    are worth is its derivative, each of them so little that the barrier vanishes long before those that bind are found.
     Ipopt by itself scales down what is steep at the guess, by no more than 1e8.
     """
-    at_guess, slopes = _objective_slopes(program)
-    size, steepest = float(np.sum(slopes)), float(np.max(slopes, initial=0.0))
+    at_guess, gradient = _objective_gradient(program)
+    size, steepest = float(np.sum(gradient)), float(np.max(gradient, initial=0.0))
     if size <= 0.0:
         return 1.0
-    sharing = size**2 / float(np.sum(slopes**2))
+    sharing = size**2 / float(np.sum(gradient**2))
     wanted = max(SLOPE * (few / sharing if sharing < ALONE else 1.0) / size, 1.0) * min(STEEP / steepest, 1.0)
     return wanted / max(min(STEEP / max(np.max(at_guess, initial=0.0), 1e-300), 1.0), 1e-8)

@@ -15,7 +15,7 @@ from gantrytau_optimica.control.control_problem import ControlProblem, Limit
 from gantrytau_optimica.solving.ipopt import Solution, objective_size
 from gantrytau_optimica.transcription.point_functions import share_of
 from gantrytau_optimica.transcription.program import Program
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 Solve = Callable[[Program, np.ndarray], Solution]
 
@@ -50,11 +50,9 @@ def unsettled(program: Program, solution: Solution) -> Solution:
 
 def located(program: Program, w: np.ndarray, held: tuple[Limit, ...] = ()) -> Program:
     """The program with all values read from the elements in which their times lie at unknowns w; held: more conditions."""
-    layouts = program.places.layouts
-    borders = [layout.placed(w).borders for layout in layouts]
+    borders = [layout.placed(w).borders for layout in program.places.layouts]
     problem = replace(program.problem, boundary=(*_own(program.problem), *held))
-    meshes = [layout.mesh for layout in layouts]
-    return transcribe(problem, meshes, layouts[0].scheme, (w[program.places.free], borders))
+    return transcribed_again(program, problem, located=(w[program.places.free], borders))
 
 
 def _own(problem: ControlProblem) -> tuple[Limit, ...]:
@@ -135,8 +133,8 @@ def _shares(program: Program, moving: Sequence[_Moving], w: np.ndarray) -> tuple
     function = ca.Function(
         "shares", [numbers], [ca.densify(shares), ca.densify(ca.jacobian(shares, numbers))]
     )
-    share, slope = (np.array(x) for x in function(w[free]))
-    return np.clip(share.ravel(), 0.0, 1.0), slope * program.places.scale[free]
+    share, gradient = (np.array(x) for x in function(w[free]))
+    return np.clip(share.ravel(), 0.0, 1.0), gradient * program.places.scale[free]
 
 
 def _elements(program: Program, moving: Sequence[_Moving], w: np.ndarray) -> list[int]:
@@ -163,12 +161,12 @@ def _moved(program: Program, one: _Moving, element: int, w: np.ndarray) -> np.nd
     w, free, scale = w.copy(), program.places.free, program.places.scale
     low, high = program.lbw[free] * scale[free], program.ubw[free] * scale[free]
     for _ in range(3):
-        (share,), (slope,) = _shares(program, [one], w)
-        slope = np.where(low < high, slope, 0.0)
+        (share,), (gradient,) = _shares(program, [one], w)
+        gradient = np.where(low < high, gradient, 0.0)
         step = (
-            slope
+            gradient
             * ((borders[element] + borders[element + 1]) / 2 - share)
-            / max(float(slope @ slope), 1e-300)
+            / max(float(gradient @ gradient), 1e-300)
         )
         w[free] = np.clip(w[free] + step * scale[free], low, high)
     return w

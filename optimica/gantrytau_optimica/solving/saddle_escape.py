@@ -1,6 +1,6 @@
-"""Where Ipopt has no slope to go by although there is something better: maxima, saddles, and obstacles met head-on.
+"""Where Ipopt has no gradient to go by although there is something better: maxima, saddles, and obstacles met head-on.
 
-What a first guess holds at a place of symmetry has no slope there and never moves; only curvature tells it. A solution
+What a first guess holds at a place of symmetry has no gradient there and never moves; only curvature tells it. A solution
 is looked at where Ipopt's last steps were regularised, or where there were none: else the matrix of its steps had as many
 negative eigenvalues as there are conditions, which is what makes a solution of the barrier problem a minimum:
 Waechter and Biegler (2006), On the implementation of an interior-point filter line-search algorithm, section 3.1.
@@ -18,7 +18,7 @@ from gantrytau_optimica.transcription.program import Program
 ASIDE = 0.1  # of its size: how far what moves most along the direction is moved
 FARTHER = (1.0, -1.0, 10.0)  # times that, one after the other, until the objective is less there
 VIOLATED = 1e-6  # of its size: by how much a limit is passed
-LEVEL = 1e-9  # slopes less than this vanish
+LEVEL = 1e-9  # derivatives less than this vanish
 BENT = 1e-6  # curvatures less than this do
 
 
@@ -37,7 +37,7 @@ def places_aside(program: Program, solution: Solution) -> Iterator[np.ndarray]:
 
 def aside(program: Program, first: np.ndarray, far: float) -> np.ndarray:
     """A first guess (n,) with its signals bent by parts `far` of their sizes, each with a phase of its own, off symmetry:
-    beside a turn about one axis other axes have a slope.
+    beside a turn about one axis other axes have a gradient.
     """
     w, scale = first.copy(), program.places.scale
     for layout in program.places.layouts:
@@ -49,7 +49,7 @@ def aside(program: Program, first: np.ndarray, far: float) -> np.ndarray:
 
 
 def beside_obstacles(program: Program, first: np.ndarray) -> np.ndarray:
-    """A first guess (n,) that passes limits without a slope to either side, moved to one side of them.
+    """A first guess (n,) that passes limits without a gradient to either side, moved to one side of them.
 
     A way straight through the middle of an obstacle is violated least there, to first order: d V / d w = 0 and
     d2 V / d w2 < 0, V: sum of what is violated.
@@ -61,9 +61,9 @@ def beside_obstacles(program: Program, first: np.ndarray) -> np.ndarray:
     passed[program.lbg == program.ubg] = 0.0
     if not np.any(passed):
         return first
-    slopes = abs(scipy_matrix(assembled.jac_g(x, [])[1]).tocsr()[np.flatnonzero(passed)])
-    steepest = slopes.max(axis=0).toarray().ravel()
-    if not np.any(steepest[slopes.indices] <= LEVEL):
+    jacobian = abs(scipy_matrix(assembled.jac_g(x, [])[1]).tocsr()[np.flatnonzero(passed)])
+    steepest = jacobian.max(axis=0).toarray().ravel()
+    if not np.any(steepest[jacobian.indices] <= LEVEL):
         return first
     bent = scipy_matrix(assembled.hess_lag(x, [], 0.0, passed)).diagonal()
     aside = (steepest <= LEVEL) & (bent < -BENT)

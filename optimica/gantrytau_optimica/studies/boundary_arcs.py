@@ -21,7 +21,7 @@ from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.trajectory import Trajectory
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 SAME = 1e-2  # relative: within it two objectives are those of one motion on two meshes
 PASSED = 1e-6  # of its range: by how much a limit may be passed between the points
@@ -34,20 +34,15 @@ FEWEST = 2  # elements of an arc
 def with_free_ends(optimum: Optimum) -> tuple[Program, Solution] | None:
     """The optimum once more, with the ends of its arcs at limits free to move; None where none is found, or no arc."""
     trajectories = list(optimum.phases.values())
-    scheme = optimum.program.places.layouts[0].scheme
+    scheme = optimum.program.scheme
     meshes = [_mesh(trajectory) for trajectory in trajectories]
     fixed = any(t.phase.courses or t.phase.sums or t.layout.knots.size for t in trajectories)
-    if (
-        fixed
-        or scheme.scheme == "shooting"
-        or scheme.points.size == 1
-        or not any(mesh.moving for mesh in meshes)
-    ):
+    if fixed or not scheme.refinable or scheme.points.size == 1 or not any(mesh.moving for mesh in meshes):
         return None
     if any(s.pieces.kind not in ("free", "ramps") for t in trajectories for s in t.phase.inputs):
         return None
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    program = transcribe(without_ramps(optimum.program.problem), meshes, scheme, located)
+    program = transcribed_again(optimum.program, without_ramps(optimum.program.problem), meshes, located)
     first = warm_start(trajectories, program)
     program = _held(program, first)
     solution = Solver(program, SolverSettings(barrier="near", max_iterations=MOST)).solve(program, first)

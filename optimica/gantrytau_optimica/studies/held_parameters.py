@@ -13,7 +13,7 @@ from gantrytau_optimica.control.control_problem import Limit
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings, objective_size
 from gantrytau_optimica.studies.kkt import stationarity
 from gantrytau_optimica.transcription.program import Program
-from gantrytau_optimica.transcription.transcribe import transcribe
+from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 SAME = 1e-6  # relative: within it two objectives are those of one solution
 STATIONARY = 1e-6  # gradient of the Lagrangian relative to its terms, a hundred times Ipopt's tolerance
@@ -26,12 +26,9 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     held = [n.name for n in program.problem.free if n.held]
     pieces = {s.name: s.pieces for phase in program.problem.phases for s in phase.inputs}
     built = _same_sizes(build(old.read, {}, [*held, *missing], pieces, old.causality), old, values)
-    layouts = program.places.layouts
     located = np.array([n.guess for n in built.problem.free])
-    borders = [layout.placed(optimum.solution.w).borders for layout in layouts]
-    new = transcribe(
-        built.problem, [layout.mesh for layout in layouts], layouts[0].scheme, (located, borders)
-    )
+    borders = [layout.placed(optimum.solution.w).borders for layout in program.places.layouts]
+    new = transcribed_again(program, built.problem, located=(located, borders))
     w = np.concatenate([located, optimum.solution.w[len(values) :]])
     solution = _carried(program, new, optimum.solution, w)
     if solution is None:  # limits in which the parameters occur are rows of their own now

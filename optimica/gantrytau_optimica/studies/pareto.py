@@ -6,7 +6,8 @@ from typing import Any, Unpack
 import numpy as np
 
 from gantrytau import ModelError, SolveError
-from gantrytau.border.refusal import USERS_ERRORS, did_you_mean
+from gantrytau.border.checks import array
+from gantrytau.border.refusal import USERS_ERRORS, Given, did_you_mean
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Problem, prepare_with
 from gantrytau_optimica.policy import TranscriptionKeywords, policy_of
@@ -34,11 +35,14 @@ def pareto(
     but `refine`, `starts` and `record`. A value that is not reached is approached by smaller steps; if that fails too,
     it is told in `.failures`. Raises ModelError for what is written wrongly, SolveError if no value is solved.
     """
-    numbers = _numbers(weight, values)
-    prepared = prepare_with(problem, [weight], policy_of("pareto", TranscriptionKeywords, policy))
+    keywords = policy_of("pareto", TranscriptionKeywords, policy)
+    numbers = array("pareto", "values", values, (None,))
+    if not numbers.size or np.unique(numbers).size < numbers.size:
+        raise ModelError("expected each value once", place="pareto", found=Given("values", values))
+    prepared = prepare_with(problem, [weight], keywords)
     _check_weight(prepared, weight)
     asked, units = _quantities(prepared, weight, along)
-    course = follow(prepared, weight, numbers)
+    course = follow(prepared, weight, numbers.tolist())
     if not course.optima:
         first = next(iter(course.failures.values()))
         raise SolveError(f"no value of {weight} was solved; the first said: {first}", optimum=first.optimum)
@@ -92,37 +96,12 @@ def _dominated(weight: str, weights: np.ndarray, columns: Mapping[str, np.ndarra
     return found
 
 
-def _numbers(weight: str, values: Any) -> list[float]:
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.array(np.nan)
-    if numbers.ndim != 1 or numbers.size == 0 or not np.all(np.isfinite(numbers)):
-        raise ModelError(
-            f"{weight}: found the values {values!r}, expected a list of finite numbers", argument="values"
-        )
-    seen, count = np.unique(numbers, return_counts=True)
-    if np.any(count > 1):
-        raise ModelError(
-            f"{weight}: the value {seen[count > 1][0]:g} is repeated, expected each one once",
-            argument="values",
-        )
-    return numbers.tolist()
-
-
 def _check_weight(prepared: Prepared, weight: str) -> None:
     held = [n.name for n in prepared.built.problem.free if n.held]
-    name = prepared.built.read.name
-    if not held:
-        raise ModelError(
-            f"{name}: {weight} is chosen by the optimiser, expected a Parameter with a value",
-            argument="weight",
-        )
     if held != [weight]:
-        raise ModelError(
-            f"{name}: {weight} has {len(held)} elements, expected one number; name one of {held}",
-            argument="weight",
-        )
+        why = f"has {len(held)} elements; name one of {held}" if held else "is chosen by the optimiser"
+        expected = f"expected a Parameter with one value: {weight} {why}"
+        raise ModelError(expected, place="pareto", found=Given("weight", weight))
 
 
 def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, Quantity], dict[str, str]]:
@@ -132,9 +111,8 @@ def _quantities(prepared: Prepared, weight: str, along: Any) -> tuple[dict[str, 
     if along is None:
         return {"unweighed": lambda o: _parts(o, weight)[0], "weighed": lambda o: _parts(o, weight)[1]}, {}
     if isinstance(along, str) or not isinstance(along, (Sequence, Mapping)) or not len(along):
-        raise ModelError(
-            f"along={along!r}: expected a list of quantities or {{label: quantity}}", argument="along"
-        )
+        expected = "expected a list of quantities or {label: quantity}"
+        raise ModelError(expected, place="pareto", found=Given("along", along))
     pairs = dict(along) if isinstance(along, Mapping) else {text: text for text in along}
     known, found, units = labels(prepared.built.read.dae)[0], {}, {}
     for label, what in pairs.items():

@@ -87,8 +87,8 @@ class PhaseRows:
 def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], start: int) -> PhaseRows:
     """The rows of phase `number` from row `start` on: at its points, between elements, at its start, and of steps."""
     phase, nx = layout.phase, len(layout.phase.states)
-    groups, slopes = _rows_at_points(places, layout, number, path, start)
-    linear, stop = [slopes], start + slopes.shape[0]
+    groups, derivatives = _rows_at_points(places, layout, number, path, start)
+    linear, stop = [derivatives], start + derivatives.shape[0]
     jumps = places.jumps(layout)
     for i, state in enumerate(phase.states if jumps.shape[0] else ()):
         rows = stop + nx * np.arange(layout.mesh.elements) + i
@@ -121,7 +121,7 @@ def phase_rows(places: Places, layout: Layout, number: int, path: list[Limit], s
 def _rows_at_points(
     places: Places, layout: Layout, number: int, path: list[Limit], start: int
 ) -> tuple[list[Rows], Sparse]:
-    """Dynamics, algebraic equations and path limits at every point, and the slopes of the states as linear part."""
+    """Dynamics, algebraic equations and path limits at every point; D x of the dynamics, their linear part."""
     phase, fractions = layout.phase, layout.fractions
     meaning = [("dynamics", s.name, 0.0, 0.0, s.nominal) for s in phase.states]
     sizes = zip(phase.residual_names, phase.residual_sizes, strict=True)
@@ -133,13 +133,11 @@ def _rows_at_points(
         Rows(kind, name, number, at_points + i, fractions, low, high, size)
         for i, (kind, name, low, high, size) in enumerate(meaning)
     ]
-    # the linear part of a row (element, point i, state) of the dynamics: sum_j D_ij x_j
-    slopes = places.slopes(layout).tocoo()
+    # row (element, point, state) of the dynamics: D x - h f = 0, here D x, in _point_term - h f
+    D_x = places.differentiated(layout).tocoo()
     nx = max(len(phase.states), 1)
-    row = (slopes.row // nx) * per_point + slopes.row % nx
-    return groups, sparse.csr_matrix(
-        (slopes.data, (row, slopes.col)), shape=(per_point * points, places.size)
-    )
+    row = (D_x.row // nx) * per_point + D_x.row % nx
+    return groups, sparse.csr_matrix((D_x.data, (row, D_x.col)), shape=(per_point * points, places.size))
 
 
 def _rows_of_stretches(places: Places, layout: Layout, number: int, start: int) -> tuple[list[Rows], Sparse]:
@@ -158,11 +156,11 @@ def _rows_of_stretches(places: Places, layout: Layout, number: int, start: int) 
 
 def _point_term(places: Places, layout: Layout, path: list[Limit], start: int, total: int) -> Term:
     phase, run = layout.phase, running(places, layout)
-    # the rest of these rows: - h f for the dynamics, g and c as they are
-    step_times_rate = phase.ode * (run.horizon * run.width)
-    values = ca.vertcat(step_times_rate, phase.residuals, *(limit.expression for limit in path))
+    h, f, g, c = run.horizon * run.width, phase.ode, phase.residuals, [limit.expression for limit in path]
+    # D x - h f = 0,  g = 0,  lower <= c <= upper
+    values = ca.vertcat(-(f * h), g, *c)
     element, place = layout.points
-    sizes = [*(-s.nominal for s in phase.states), *phase.residual_sizes, *(limit.size for limit in path)]
+    sizes = [*(s.nominal for s in phase.states), *phase.residual_sizes, *(limit.size for limit in path)]
     factor = np.tile(1.0 / np.array(sizes), (element.size, 1))
     index = np.arange(factor.size)
     scatter = sparse.csr_matrix((factor.ravel(), (start + index, index)), shape=(total, index.size))

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, SampleSum
 from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse
@@ -58,9 +59,8 @@ def sample_sums(places: Places, layout: Layout) -> list[Term]:
     """The sums over samples of a phase, a small function at every sample. Raises ModelError where borders move."""
     problem, found = places.problem, []
     if layout.phase.sums and layout.knots.size:
-        raise ModelError(
-            f"{problem.name}: lengths='free' and sums over samples do not go together; give the lengths of the elements"
-        )
+        why = "expected 'given' beside sums over samples; give the lengths of the elements"
+        raise ModelError(why, place=problem.name, found=Given("lengths", "free"))
     for one, error, element, place, known in sample_errors(layout):
         weight = float(ca.jacobian(problem.objective, one.symbol))
         weights = sparse.csr_matrix(np.full((1, one.times.size), weight))

@@ -1,8 +1,8 @@
 """Where the unknowns of a transcribed problem stand, and the constant matrices that pick them out.
 
-Within an element every signal is a polynomial through some nodes: a state through the start of the element and
-its collocation points, an algebraic or a free input through the points, a constant input through one node, a
-linear one through the ends of its group of elements. Nodes are places in the element, 0 to 1.
+Within an element every signal is a polynomial through some nodes: a state through those of the scheme (the start of the
+element and mostly its points), an algebraic or a free input through the points, a constant input through one node, a
+linear one through the ends of its group of elements. Nodes lie in the element, from 0 to 1.
 """
 
 from dataclasses import dataclass, field
@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Signal
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.scheme import Collocation
@@ -64,7 +65,7 @@ def polynomials(nodes: np.ndarray, place: ca.SX) -> ca.SX:
 class Layout:
     """The unknowns of one phase on n elements with k points.
 
-    starts (n + 1, nx): states at the borders; with Radau points the last point of an element is the start of the
+    starts (n + 1, nx): states at the borders; where the last node is 1, it is the start of the
     next. tracks: of all signals in their order. chains: consecutive values of piecewise inputs, by number of the
     signal. knots: the moving borders. moment: share of the horizon of every unknown from `first` on. begin (nz,): algebraics
     at the start, where conditions ask for them: polynomials through the points would be extrapolated there.
@@ -157,8 +158,8 @@ class Places:
         """To the free numbers."""
         return self.pick([np.arange(self.free.size)], [self.free], [np.ones(self.free.size)], self.free.size)
 
-    def slopes(self, layout: Layout) -> Sparse:
-        """To the derivatives, with respect to the place in the element, of all states at all points, divided by size."""
+    def differentiated(self, layout: Layout) -> Sparse:
+        """To D x: derivatives of all states at all points by the place in the element, divided by size."""
         n, k, nx = layout.mesh.elements, layout.scheme.points.size, len(layout.phase.states)
         if not nx:
             return sparse.csr_matrix((0, self.size))
@@ -172,7 +173,7 @@ class Places:
     def jumps(self, layout: Layout) -> Sparse:
         """To the end of each element less the start of the next; no rows where the two are one unknown."""
         n, nx = layout.mesh.elements, len(layout.phase.states)
-        if layout.scheme.points[-1] == 1.0 or not nx:
+        if layout.scheme.nodes[-1] == 1.0 or not nx:
             return sparse.csr_matrix((0, self.size))
         sizes = np.array([s.nominal for s in layout.phase.states])
         nodes = np.stack([layout.tracks[i].unknowns for i in range(nx)], axis=2)
@@ -204,7 +205,7 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
         *range(nx + nz),
         *(nx + nz + i for i, u in enumerate(phase.inputs) if u.pieces.kind == "free"),
     ]
-    per_point, shared = len(pointwise), scheme.points[-1] == 1.0
+    per_point, shared = len(pointwise), scheme.nodes[-1] == 1.0
     per_element = k * per_point + (0 if shared else nx)
     begin = first + m + nx
     point = begin + per_element * np.arange(n)[:, None] + per_point * np.arange(k)[None, :]
@@ -214,13 +215,14 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
     starts = np.vstack([first + m + np.arange(nx), ends])
     size = m + nx + per_element * n
     owner, moment = np.full(size, -1), np.zeros(size)
-    times = mesh.borders[:-1, None] + mesh.widths[:, None] * scheme.points
+    nodes, points = np.tile(scheme.nodes, (n, 1)), np.tile(scheme.points, (n, 1))
+    at_nodes, at_points = (mesh.borders[:-1, None] + mesh.widths[:, None] * x for x in (nodes[:, 1:], points))
     moment[:m] = mesh.borders[list(mesh.moving)]
     owner[starts - first], moment[starts - first] = np.arange(nx), mesh.borders[:, None]
-    nodes, points = np.tile(scheme.nodes, (n, 1)), np.tile(scheme.points, (n, 1))
     tracks: dict[int, Track] = {}
     for offset, i in enumerate(pointwise):
-        owner[point + offset - first], moment[point + offset - first] = i, times
+        mine = point + offset - first
+        owner[mine], moment[mine] = i, at_nodes if i < nx else at_points
         if i < nx:
             tracks[i] = Track(nodes, np.column_stack([starts[:-1, i], point + offset]))
         else:
@@ -230,10 +232,8 @@ def _lay_out(phase: Phase, mesh: Mesh, scheme: Collocation, first: int) -> Layou
         if signal.pieces.kind == "free":
             continue
         if mesh.moving and signal.pieces.kind == "linear" and signal.pieces.elements > 1:
-            raise ModelError(
-                f"controls {signal.name}: straight lines over several elements and lengths='free' do not go together; "
-                "take elements=1 or give the lengths"
-            )
+            why = "expected 'given' beside straight lines over several elements; give the lengths, or elements=1 there"
+            raise ModelError(why, place=f"controls {signal.name}", found=Given("lengths", "free"))
         tracks[i], new = pieces_of(signal, mesh, first + owner.size)
         if signal.pieces.kind != "ramps":
             chains[i] = first + owner.size + np.arange(new.size)

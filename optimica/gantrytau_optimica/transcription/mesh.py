@@ -8,6 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, whole
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import Phase
 
 SHORTEST = 0.1  # of its length in the guess, for a stretch between two moving borders
@@ -67,25 +69,14 @@ class Mesh:
 
 def mesh_of(elements: Any, free_lengths: bool = False) -> Mesh:
     """A mesh from a number of equal elements, or from lengths relative to each other. Raises ModelError."""
-    if isinstance(elements, (Sequence, np.ndarray)):
-        try:
-            lengths = np.asarray(elements, dtype=float)
-        except (TypeError, ValueError):
-            lengths = np.array([np.nan])
-        if lengths.ndim != 1 or lengths.size < 1 or not np.all(np.isfinite(lengths)) or np.any(lengths <= 0):
-            raise ModelError(
-                f"elements={elements!r}: expected a whole number of at least 1, or the lengths of the elements, all above 0",
-                argument="elements",
-            )
+    if isinstance(elements, (Sequence, np.ndarray)) and not isinstance(elements, str):
+        lengths = array("", "elements", elements, (None,))
+        if not lengths.size or np.any(lengths <= 0):
+            raise ModelError("expected lengths above 0", found=Given("elements", elements))
         borders = np.concatenate([[0.0], np.cumsum(lengths / lengths.sum())])
         borders[-1] = 1.0
-    elif isinstance(elements, (int, np.integer)) and not isinstance(elements, bool) and elements >= 1:
-        borders = np.linspace(0.0, 1.0, int(elements) + 1)
     else:
-        raise ModelError(
-            f"elements={elements!r}: expected a whole number of at least 1, or a list of lengths",
-            argument="elements",
-        )
+        borders = np.linspace(0.0, 1.0, whole("", "elements", elements, least=1) + 1)
     return Mesh(borders, tuple(range(1, borders.size - 1)) if free_lengths else ())
 
 
@@ -96,9 +87,8 @@ def with_jumps(mesh: Mesh, phase: Phase) -> Mesh:
         return mesh
     if mesh.moving:
         name = next(course.name for course in phase.courses if course.jumps.size)
-        raise ModelError(
-            f"{name}: its steps and lengths='free' do not go together, as borders stand at the steps; give the lengths"
-        )
+        why = "expected 'given', as borders stand at the steps of this input"
+        raise ModelError(why, place=name, found=Given("lengths", "free"))
     start, final = float(phase.start_time), float(phase.final_time)
     return with_borders(mesh, (np.concatenate(jumps) - start) / (final - start))
 

@@ -11,7 +11,9 @@ from scipy import sparse
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.transcription.assemble import Assembled, Term
 from gantrytau_optimica.transcription.layout import Places
+from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.point_functions import Place, places_of_points, share_of, single_term
+from gantrytau_optimica.transcription.scheme import Collocation
 
 FEW = 1e-5  # of an element, by which a moving point may stand outside of it
 CLOSE = 1e-2  # of its margin: what is closer rests on it
@@ -47,6 +49,16 @@ class Program:
     lbg: np.ndarray
     ubg: np.ndarray
     points: tuple[Place, ...] = field(default=())
+
+    @property
+    def meshes(self) -> list[Mesh]:
+        """The elements of every phase; borders that move as they were guessed."""
+        return [layout.mesh for layout in self.places.layouts]
+
+    @property
+    def scheme(self) -> Collocation:
+        """How it was transcribed."""
+        return self.places.layouts[0].scheme
 
     def with_numbers(self, problem: ControlProblem) -> "Program":
         """The same program with other free numbers, first guesses and margins of square roots."""
@@ -126,17 +138,9 @@ def boundary_part(places: Places, where: Sequence[Place], start: int) -> tuple[l
     """The conditions on values at single times, the last rows of every program, from row `start` on."""
     boundary = places.problem.boundary
     rows = start + np.arange(len(boundary))
+    never = np.array([np.nan])
     groups = [
-        Rows(
-            "boundary",
-            limit.name,
-            -1,
-            np.array([row]),
-            np.array([np.nan]),
-            limit.lower,
-            limit.upper,
-            limit.size,
-        )
+        Rows("boundary", limit.name, -1, np.array([row]), never, limit.lower, limit.upper, limit.size)
         for row, limit in zip(rows, boundary, strict=True)
     ]
     if not boundary:

@@ -1,23 +1,23 @@
 """Collocation on one element: points, differentiation, interpolation and quadrature on [0, 1]."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
-from gantrytau import ModelError
-
-SCHEMES = {"radau": "radau", "gauss": "legendre"}
-MOST_POINTS = 9
+from gantrytau_optimica.transcription.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
 class Collocation:
     """A collocation scheme.
 
-    points: (k,) in (0, 1]; nodes: (k + 1,) with 0 before them; differentiation: (k + 1, k), derivative at
-    point j of the polynomial through values v at the nodes is v @ differentiation[:, j]; end: (k + 1,) its
-    value at 1; weights: (k,) of the quadrature over the points.
+    Polynomials through values v at the nodes, (k + 1,) from 0 on, are states within an element; their derivatives are
+    those of the model at the points, (k,) in [0, 1]. differentiation: (k + 1, k), the derivative at point j is
+    v @ differentiation[:, j]; end: (k + 1,) the value at 1; weights: (k,) of the quadrature over the points.
+    refinable: whether inputs are free at every point, and the program may be put on other meshes, with borders that move.
     """
 
     scheme: str
@@ -26,30 +26,28 @@ class Collocation:
     differentiation: np.ndarray
     end: np.ndarray
     weights: np.ndarray
+    refinable: bool = True
+
+    def divided(self, meshes: Sequence[Mesh]) -> list[Mesh]:
+        """The meshes on which the program stands, from those of the caller."""
+        return list(meshes)
 
 
-def collocation(scheme: str, count: int) -> Collocation:
-    """The scheme "radau" or "gauss" with `count` points per element. Raises ModelError for others."""
-    if scheme not in SCHEMES:
-        raise ModelError(
-            f"scheme={scheme!r}: expected one of {', '.join((*SCHEMES, 'shooting'))}", argument="scheme"
-        )
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_POINTS:
-        raise ModelError(
-            f"points={count!r}: expected a whole number from 1 to {MOST_POINTS}", argument="points"
-        )
-    points = np.array(ca.collocation_points(count, SCHEMES[scheme]))
-    nodes = np.concatenate([[0.0], points])
-    powers = np.arange(count + 1)
+def collocation(scheme: str, points: np.ndarray, nodes: np.ndarray) -> Collocation:
+    """The scheme with these points (k,) and nodes (k + 1,)."""
+    powers = np.arange(nodes.size)
     # columns of `coefficients`: the polynomials that are one at one node and zero at the others
     coefficients = np.linalg.inv(nodes[:, None] ** powers)
-    slopes = powers[1:] * points[:, None] ** powers[:-1]
+    derivatives = powers[1:] * points[:, None] ** powers[:-1]
     weights = np.linalg.solve((points[:, None] ** powers[:-1]).T, 1.0 / powers[1:])
-    return Collocation(
-        scheme,
-        points,
-        nodes,
-        (slopes @ coefficients[1:]).T,
-        coefficients.sum(axis=0),
-        weights,
-    )
+    differentiation = (derivatives @ coefficients[1:]).T
+    return Collocation(scheme, points, nodes, differentiation, coefficients.sum(axis=0), weights)
+
+
+def _orthogonal(scheme: str, polynomials: str, count: int) -> Collocation:
+    points = np.array(ca.collocation_points(count, polynomials))
+    return collocation(scheme, points, np.concatenate([[0.0], points]))
+
+
+radau = partial(_orthogonal, "radau", "radau")
+gauss = partial(_orthogonal, "gauss", "legendre")

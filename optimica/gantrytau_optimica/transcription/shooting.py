@@ -19,12 +19,14 @@ inputs; use "radau" for those.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit
 from gantrytau_optimica.transcription.assemble import Term, assemble
@@ -53,12 +55,20 @@ STAGES = Collocation("shooting", PLACES, np.append(0.0, PLACES), SLOPES, np.eye(
 class Shooting(Collocation):
     """How a solution is read: values at the ends of steps, integrals by Simpson's rule; `steps` in each element."""
 
-    steps: int
+    steps: int = 1
+
+    def divided(self, meshes: Sequence[Mesh]) -> list[Mesh]:
+        """The meshes whose elements are the steps."""
+        parts = np.arange(self.steps) / self.steps
+        inner = [(mesh.borders[:-1, None] + mesh.widths[:, None] * parts).ravel() for mesh in meshes]
+        return [Mesh(np.append(borders, 1.0)) for borders in inner]
 
 
-def _reading(steps: int) -> Shooting:
-    slopes, end = np.array([[-1.0], [1.0]]), np.array([0.0, 1.0])
-    return Shooting("shooting", end[1:], end, slopes, end, np.array([1.0, 4.0, 1.0]) / 6, steps)
+def shooting(steps: int) -> Shooting:
+    """The method with `steps` steps in each element."""
+    difference, end = np.array([[-1.0], [1.0]]), np.array([0.0, 1.0])
+    simpson = np.array([1.0, 4.0, 1.0]) / 6
+    return Shooting("shooting", end[1:], end, difference, end, simpson, refinable=False, steps=steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,34 +129,22 @@ class ShootingLayout(Layout):
         return self.mesh.borders
 
 
-def shoot(problem: ControlProblem, meshes: Sequence[Mesh], steps: int) -> Program:
-    """The nonlinear program of `problem` on one mesh per phase with `steps` steps in each element.
+def shoot(
+    problem: ControlProblem, meshes: Sequence[Mesh], scheme: Collocation, located: Any = None
+) -> Program:
+    """The nonlinear program of `problem` on one mesh of steps per phase, of which `scheme.steps` make up an element.
 
-    Raises ModelError for elements whose lengths are free, and for values at times that move inside of the horizon.
+    Raises ModelError for values at times that move inside of the horizon, so that none have to be `located`.
     """
-    parts, fine = np.arange(steps) / steps, []
-    for mesh in meshes:
-        borders = np.append((mesh.borders[:-1, None] + mesh.widths[:, None] * parts).ravel(), 1.0)
-        fine.append(Mesh(borders, mesh.moving))
-    return shoot_steps(problem, fine, _reading(steps))
-
-
-def shoot_steps(problem: ControlProblem, meshes: Sequence[Mesh], scheme: Shooting) -> Program:
-    """The same on meshes that hold the steps already, of which `scheme.steps` make up an element."""
-    if any(mesh.moving for mesh in meshes):
-        raise ModelError(
-            f"{problem.name}: lengths='free' and scheme='shooting' do not go together; use scheme='radau' or given lengths"
-        )
+    assert isinstance(scheme, Shooting)
     places = _places(problem, meshes, scheme)
     where = places_of_points(
         places, np.array([n.guess for n in problem.free]), [x.mesh.borders for x in places.layouts]
     )
     moving = next((one for one in where if one.place is None), None)
     if moving is not None:
-        raise ModelError(
-            f"{problem.name}: at({moving.point.time}, ...): this share of the horizon changes with free numbers, which "
-            "scheme='shooting' cannot follow; use scheme='radau'"
-        )
+        where = f"at({moving.point.time}, ...): this share of the horizon changes with free numbers; take "
+        raise ModelError(where, Given("scheme", "radau"), place=problem.name, argument="scheme")
     groups: list[Rows] = []
     linear: list[Sparse] = []
     parts: list[tuple[ShootingLayout, list[Limit], int, int]] = []

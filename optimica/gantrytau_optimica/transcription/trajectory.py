@@ -66,7 +66,7 @@ class Trajectory:
     @cached_property
     def fractions(self) -> np.ndarray:
         """The start, all collocation points and the end, as shares of the horizon."""
-        points = self.layout.scheme.points
+        points = self.layout.scheme.points[self.layout.scheme.points > 0.0]
         inside = (self.mesh.borders[:-1, None] + self.mesh.widths[:, None] * points).ravel()
         return np.concatenate([[0.0], inside] if points[-1] == 1.0 else [[0.0], inside, [1.0]])
 

@@ -8,21 +8,9 @@ import pytest
 import scipy.signal as signal
 
 from gantrytau import Input, Model, ModelError, StateSpace, connect, linearize, simulate
-from gantrytau.mechanics.translational import Damper, Fixed, Force, Mass, Spring
+from tests.answers.test_linearization import Oscillator
 
 OSCILLATOR = ([[0, 1], [-25, -1.5]], [0, 0.5], [50, 0])
-
-
-class Mounted(Model):
-    """A mass between a wall and a force."""
-
-    wall, mass, spring, damper, force = Fixed(), Mass(m=2.0), Spring(c=50.0), Damper(d=3.0), Force()
-
-    def equations(self):
-        for part in (self.spring, self.damper):
-            yield connect(self.wall.flange, part.flange_a)
-            yield connect(part.flange_b, self.mass.flange)
-        yield connect(self.force.flange, self.mass.flange)
 
 
 def random_system(seed, n=5, m=2, k=3):
@@ -33,9 +21,7 @@ def random_system(seed, n=5, m=2, k=3):
 def test_oscillator_has_the_poles_and_the_damping_of_the_textbook():
     system = StateSpace(*OSCILLATOR)
     w, zeta = 5.0, 0.15
-    assert system.poles == pytest.approx(
-        w * (-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([-1, 1])), rel=1e-14
-    )
+    assert system.poles == pytest.approx(w * (-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([-1, 1])), 1e-14)
     assert system.damping == pytest.approx([zeta, zeta], rel=1e-13)
     assert system.eigenfrequencies == pytest.approx([w / (2 * np.pi)] * 2, rel=1e-14)
     assert system.zeros.size == 0
@@ -62,8 +48,6 @@ def test_discrete_system_has_the_response_of_scipy_up_to_half_the_sampling_frequ
         signal.dlti(system.A, system.B, system.C, system.D, dt=0.05), 2 * np.pi * hertz * 0.05
     )
     assert system.response(hertz)[0, 0] == pytest.approx(expected, rel=1e-9)
-    with pytest.raises(ModelError, match=r"found a frequency of 10.1 Hz, expected none above 10 Hz"):
-        system.response([10.1])
 
 
 def test_response_is_infinite_at_a_pole_and_finite_beside_it():
@@ -106,9 +90,7 @@ def test_zeros_of_a_system_with_feedthrough_and_of_several_inputs():
     A, B, C, D = random_system(5, m=2, k=2)
     # where D is regular they are the poles of the inverse
     expected = np.linalg.eigvals(A - B @ np.linalg.solve(D, C))
-    assert np.sort_complex(StateSpace(A, B, C, D).zeros) == pytest.approx(
-        np.sort_complex(expected), rel=1e-10
-    )
+    assert np.sort_complex(StateSpace(A, B, C, D).zeros) == pytest.approx(np.sort_complex(expected), 1e-10)
     blocked = StateSpace(A, B, C, D).zeros
     for z in blocked:  # each makes the system matrix lose rank
         whole = np.block([[A - z * np.eye(5), B], [C, D]])
@@ -165,7 +147,7 @@ def test_component_moves_as_its_matrices_say():
 
 
 def test_linearization_answers_as_a_linear_system_with_units(tmp_path):
-    linear = linearize(Mounted(), outputs=["mass.s", "mass.v"])
+    linear = linearize(Oscillator(), outputs=["mass.s", "mass.v"])
     hertz = np.array([0.5, 2.0])
     s = 2j * np.pi * hertz
     assert linear.response(hertz)[0, 0] == pytest.approx(1 / (2 * s**2 + 3 * s + 50), rel=1e-12)
@@ -229,68 +211,46 @@ def test_phases_of_measured_points_are_in_the_turn_of_the_line():
     assert np.allclose(np.abs(off), np.degrees(1.0), atol=0.1)
 
 
+ONE = StateSpace(1, 1, 1)
+EACH_SECOND = StateSpace(1, 1, 1, period=1.0)
+TWO_INPUTS = StateSpace(2, [[1.0, 2.0]], 1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "argument"),
+    [
+        (lambda: StateSpace(np.eye(2), [1.0, 2.0, 3.0], [1, 0]), "B"),
+        (lambda: StateSpace(np.ones((2, 3)), [1, 0], [1, 0]), "A"),
+        (lambda: StateSpace(np.eye(2), [1, 0], [1, np.nan]), "C"),
+        (lambda: StateSpace(np.eye(2), [1, 0], [1, 0], [[1.0, 2.0]]), "D"),
+        (lambda: ONE.discrete(-1.0), "period"),
+        (lambda: ONE.response([-1.0]), "frequencies"),
+        (lambda: EACH_SECOND.response([0.6]), "frequencies"),
+        (lambda: EACH_SECOND.simulate(np.ones((4, 2))), "u"),
+        (lambda: EACH_SECOND.simulate([1.0], x=[1, 2]), "x"),
+        (lambda: ONE.plot_bode(beside=cast(Any, [ONE])), "beside"),
+        (lambda: ONE.plot_poles(beside=cast(Any, {"b": 3})), "beside"),
+        (lambda: ONE.plot_bode(beside={"StateSpace": ONE}), "beside"),
+        (lambda: ONE.plot_bode(beside={"b": TWO_INPUTS}), "beside"),
+        (lambda: ONE.plot_poles(file="poles.xyz"), "file"),
+    ],
+)
+def test_wrong_arguments_are_refused_by_their_names(wrong, argument):
+    with pytest.raises(ModelError) as refused:
+        wrong()
+    assert refused.value.argument == argument
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (
-            lambda: StateSpace(np.eye(2), [1.0, 2.0, 3.0], [1, 0]),
-            r"B has shape \(3, 1\), expected \(2, 1\): a row for each",
-        ),
-        (lambda: StateSpace(np.ones((2, 3)), [1, 0], [1, 0]), r"A has shape \(2, 3\), expected \(2, 2\)"),
-        (lambda: StateSpace(np.eye(2), [1, 0], [1, np.nan]), "C has elements that are not finite"),
-        (
-            lambda: StateSpace(np.eye(2), [1, 0], [1, 0], [[1.0, 2.0]]),
-            r"D has shape \(1, 2\), expected \(1, 1\)",
-        ),
-        (lambda: StateSpace("a", 1, 1), "matrices that are no numbers"),
-        (lambda: StateSpace(1, 1, 1, period=0), "found period=0, expected a finite number above zero, in s"),
-        (
-            lambda: StateSpace(1, 1, 1, period=0.1).discrete(0.2),
-            "found a discrete system with a period of 0.1 s",
-        ),
-        (lambda: StateSpace(1, 1, 1).discrete(-1.0), "found period=-1.0"),
-        (lambda: StateSpace(1, 1, 1).response([-1.0]), r"found frequencies \[-1.0\], expected numbers in Hz"),
-        (
-            lambda: StateSpace(1, 1, 1).simulate([1.0, 2.0]),
-            "expected .times, values.: the system is continuous",
-        ),
-        (lambda: StateSpace(1, 1, 1).simulate(([0, 0], [1, 2])), "expected one each, rising"),
-        (
-            lambda: StateSpace(1, 1, 1, period=1.0).simulate(([0, 1], [1, 2])),
-            "expected values .N, 1. alone, one row",
-        ),
-        (
-            lambda: StateSpace(1, 1, 1, period=1.0).simulate(np.ones((4, 2))),
-            r"have shape \(4, 2\), expected \(N, 1\)",
-        ),
-        (
-            lambda: StateSpace(1, 1, 1, period=1.0).simulate([1.0, np.inf]),
-            "sample 1 of the inputs is not finite",
-        ),
-        (
-            lambda: StateSpace(1, 1, 1, period=1.0).simulate([1.0], x=[1, 2]),
-            r"x has shape \(2,\), expected \(1,\)",
-        ),
-        (
-            lambda: StateSpace(1, np.ones((1, 9)), np.ones((2, 1))).plot_bode(),
-            "found 2 outputs and 9 inputs, expected 1",
-        ),
-        (
-            lambda: StateSpace(1, 1, 1).plot_bode(beside=cast(Any, [StateSpace(2, 1, 1)])),
-            "found beside=list, expected systems or measured spectra by their names",
-        ),
-        (lambda: StateSpace(1, 1, 1).plot_poles(beside=cast(Any, {"b": 3})), "found b=int, expected systems"),
-        (
-            lambda: StateSpace(1, 1, 1).plot_bode(beside={"StateSpace": StateSpace(2, 1, 1)}),
-            "found the name 'StateSpace' twice",
-        ),
-        (
-            lambda: StateSpace(1, 1, 1).plot_bode(beside={"b": StateSpace(2, [[1.0, 2.0]], 1)}),
-            "found 1 outputs and 2 inputs of b, expected 1 and 1",
-        ),
-        (lambda: StateSpace(1, 1, 1).plot_poles(file="poles.xyz"), "with the suffix '.xyz'"),
+        (lambda: EACH_SECOND.discrete(0.2), "found a discrete system with a period of 1 s"),
+        (lambda: ONE.simulate([1.0, 2.0]), "expected .times, values.: the system is continuous"),
+        (lambda: ONE.simulate(([0, 0], [1, 2])), "times that do not rise"),
+        (lambda: EACH_SECOND.simulate(([0, 1], [1, 2])), "expected values .N, 1. alone, one row"),
+        (lambda: StateSpace(1, np.ones((1, 9)), np.ones((2, 1))).plot_bode(), "2 outputs and 9 inputs"),
     ],
 )
-def test_wrong_input_is_refused(wrong, words):
+def test_what_a_system_cannot_do_is_said(wrong, words):
     with pytest.raises(ModelError, match=words):
         wrong()

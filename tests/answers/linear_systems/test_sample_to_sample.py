@@ -157,9 +157,8 @@ def test_linearization_about_a_point_differs_by_second_order():
 @pytest.mark.parametrize(
     ("model", "period", "words"),
     [
-        (Servo(), 0.03, r"found period=0.03 s, expected a multiple of 0.02 s"),
-        (Servo(), 0.0, r"found period=0.0, expected a finite number above zero, in s"),
-        (Servo(measured_every=0.02 / np.pi), None, "which never come together again"),
+        (Servo(), 0.03, "expected a multiple of 0.02 s"),
+        (Servo(measured_every=0.02 / np.pi), None, "never come together again"),
     ],
 )
 def test_periods_that_do_not_fit_are_refused(model, period, words):

@@ -163,7 +163,7 @@ def other_poses(table):
     ("change", "words"),
     [
         (swapped, "q1 stands in column q2, q2 stands in column q1"),
-        (in_millimetres, "they are in mm, expected m"),
+        (in_millimetres, "undo this: q in mm"),
         (other_poses, "q1, q2, ... must be those of poses.csv"),
     ],
 )

@@ -101,10 +101,13 @@ def test_what_is_wrong_is_told_in_options(cell):
             "expected a text that can be printed",
         ),
         (["panel", "--port", 70000], "'--port': expected at most 65535"),
-        (["run", cell / "cell.toml", "--stop", 1, "--port", 70000], "found --port 70000"),
+        (
+            ["run", cell / "cell.toml", "--stop", 1, "--port", 70000],
+            "expected a whole number of at least 0 and of at most 65535",
+        ),
         (
             ["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", "nan"],
-            "wait: found --wait nan, expected a time in s, 0 or more",
+            "expected a number of at least 0 in s",
         ),
         (
             ["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", 0.1],

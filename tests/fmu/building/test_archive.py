@@ -14,7 +14,6 @@ from gantrytau_fmu.building.archive import (
     check_target,
     universal,
     write_archive,
-    write_fmu,
 )
 from gantrytau_fmu.building.platforms import PLATFORMS
 
@@ -67,7 +66,7 @@ def test_a_universal_file_holds_both_at_pages():
 
 
 def test_the_content_comes_back_with_the_description_first(tmp_path):
-    path = write_fmu(tmp_path / "robot.fmu", MEMBERS)
+    path = write_archive(tmp_path / "robot.fmu", MEMBERS)
     with zipfile.ZipFile(path) as found:
         assert found.testzip() is None
         assert found.namelist() == ["modelDescription.xml", *sorted(MEMBERS)[::2]]
@@ -79,7 +78,10 @@ def test_the_content_comes_back_with_the_description_first(tmp_path):
 
 def test_the_same_members_give_the_same_bytes(tmp_path):
     backwards = dict(reversed(MEMBERS.items()))
-    first, second = write_fmu(tmp_path / "a.fmu", MEMBERS), write_fmu(str(tmp_path / "b.fmu"), backwards)
+    first, second = (
+        write_archive(tmp_path / "a.fmu", MEMBERS),
+        write_archive(str(tmp_path / "b.fmu"), backwards),
+    )
     assert first.read_bytes() == second.read_bytes()
 
 
@@ -93,34 +95,34 @@ def test_a_file_is_replaced_unless_it_must_not(tmp_path):
     path = tmp_path / "robot.fmu"
     path.write_text("old")
     with pytest.raises(ModelError, match=r"robot\.fmu: found a file, expected none; .*overwrite=True"):
-        write_fmu(path, MEMBERS, overwrite=False)
+        write_archive(path, MEMBERS, overwrite=False)
     assert path.read_text() == "old"
-    write_fmu(path, MEMBERS)
+    write_archive(path, MEMBERS)
     assert zipfile.is_zipfile(path)
-    assert write_fmu(tmp_path / "new.fmu", MEMBERS, overwrite=False).exists()
+    assert write_archive(tmp_path / "new.fmu", MEMBERS, overwrite=False).exists()
 
 
 def test_wrong_paths_are_refused(tmp_path):
     with pytest.raises(
         ModelError, match=r"robot\.zip: found the suffix '\.zip', expected '\.fmu'; call it robot\.fmu"
     ):
-        write_fmu(tmp_path / "robot.zip", MEMBERS)
+        write_archive(tmp_path / "robot.zip", MEMBERS)
     with pytest.raises(ModelError, match=r"found the suffix '', expected '\.fmu'"):
-        write_fmu(tmp_path / "robot", MEMBERS)
+        write_archive(tmp_path / "robot", MEMBERS)
     (tmp_path / "folder.fmu").mkdir()
     with pytest.raises(
         ModelError, match=r"folder\.fmu: found a folder, expected a file that ends in '\.fmu'"
     ):
-        write_fmu(tmp_path / "folder.fmu", MEMBERS)
+        write_archive(tmp_path / "folder.fmu", MEMBERS)
     with pytest.raises(ModelError, match="does not exist; create it"):
-        write_fmu(tmp_path / "nowhere" / "robot.fmu", MEMBERS)
+        write_archive(tmp_path / "nowhere" / "robot.fmu", MEMBERS)
     (tmp_path / "file").touch()
     with pytest.raises(ModelError, match="does not exist; create it"):
-        write_fmu(tmp_path / "file" / "robot.fmu", MEMBERS)
+        write_archive(tmp_path / "file" / "robot.fmu", MEMBERS)
     with pytest.raises(ModelError, match=r"cannot be written .*name another one"):
-        write_fmu(tmp_path / ("x" * 300 + ".fmu"), MEMBERS)
+        write_archive(tmp_path / ("x" * 300 + ".fmu"), MEMBERS)
     with pytest.raises(ModelError, match=r"cannot be written .*name another one"):
-        write_fmu(tmp_path / "nul\0.fmu", MEMBERS)
+        write_archive(tmp_path / "nul\0.fmu", MEMBERS)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder.fmu"]
 
 
@@ -128,7 +130,7 @@ def test_wrong_paths_are_refused(tmp_path):
 def test_a_folder_without_permission_is_refused(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(ModelError, match=r"cannot be written .*permission"):
-        write_fmu(tmp_path / "robot.fmu", MEMBERS)
+        write_archive(tmp_path / "robot.fmu", MEMBERS)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +143,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch, er
     with pytest.raises(
         ModelError, match=rf"robot\.fmu: cannot be written \({error.strerror}\), expected a folder"
     ):
-        write_fmu(path, MEMBERS)
+        write_archive(path, MEMBERS)
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -149,7 +151,7 @@ def test_a_failure_while_writing_leaves_what_was_there(tmp_path, monkeypatch, er
 def test_an_interruption_leaves_what_was_there(tmp_path, monkeypatch):
     monkeypatch.setattr(archive, "_write", failing(KeyboardInterrupt()))
     with pytest.raises(KeyboardInterrupt):
-        write_fmu(tmp_path / "robot.fmu", MEMBERS)
+        write_archive(tmp_path / "robot.fmu", MEMBERS)
     assert list(tmp_path.iterdir()) == []
 
 

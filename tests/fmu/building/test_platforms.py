@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from gantrytau import ModelError
+from gantrytau_fmu import Build
 from gantrytau_fmu.building.platforms import PLATFORMS, chosen, native
 
 
@@ -56,13 +57,8 @@ def test_a_platform_named_besides_native_is_built_as_the_named_one(monkeypatch):
 
 
 def test_an_unknown_platform_is_refused():
-    with pytest.raises(
-        ModelError, match=r"platforms: found 'Win64', expected one of native, all, x86_64-linux.*"
-    ):
-        chosen(("native", "Win64"))
-    with pytest.raises(ModelError, match="did you mean 'win64'"):
-        chosen("Win64")
-    with pytest.raises(ModelError, match=r"found 'solaris', expected one of .* darwin64$"):
-        chosen("solaris")
-    with pytest.raises(ModelError, match="found '5', expected"):
+    with pytest.raises(ModelError, match=r"'Win64', expected 'native', .*; did you mean 'win64'") as refusal:
+        Build(platforms=("native", "Win64"))
+    assert refusal.value.argument == "platforms"
+    with pytest.raises(ModelError, match="'5', expected"):
         chosen((5,))  # type: ignore[arg-type]

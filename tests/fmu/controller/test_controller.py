@@ -285,7 +285,7 @@ def test_a_plant_that_breaks_is_told_with_its_time():
 
 @pytest.mark.parametrize("value", [lambda t: 1 / (t < 0.1), lambda t: 0.0 if t < 0.1 else math.nan])
 def test_a_reference_that_breaks_leaves_what_was_run(value, plant):
-    with pytest.raises(SolveError, match=r"references q_ref.*t = 0\.1 s") as error:
+    with pytest.raises(SolveError, match=r"references: q_ref.*t = 0\.1 s") as error:
         Controller(plant, lambda t, v: {}, references={"q_ref": value}).run(STOP)
     assert error.value.result.time.size == 25
 
@@ -311,9 +311,9 @@ def test_a_plant_that_ends_ends_the_run_with_its_words():
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("abc", "references q_ref: found 'abc', expected a number or an array"),
-        ([1.0, 2.0], "references q_ref: found [1.0, 2.0], expected 1 finite number"),
-        (math.nan, "references q_ref: found nan, expected 1 finite number"),
+        ("abc", "references: q_ref: found 'abc', expected a number or an array"),
+        ([1.0, 2.0], "references: q_ref: found [1.0, 2.0], expected 1 finite number"),
+        (math.nan, "references: q_ref: found nan, expected 1 finite number"),
     ],
 )
 def test_references_that_are_none_are_refused(value, said, plant):

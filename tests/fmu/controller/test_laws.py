@@ -141,33 +141,17 @@ def test_a_model_under_its_servo_moves_as_in_one_simulation(tmp_path):
 
 
 WRONG = [
-    (
-        lambda t, v: {"q": 1.0},
-        SolveError,
-        "the function <lambda> answered 'q', which is no reference; there is q_ref.",
-    ),
-    (
-        lambda t, v: 1.0,
-        SolveError,
-        "the function <lambda> answered 1.0, expected {name: value} of references",
-    ),
+    (lambda t, v: {"q": 1.0}, SolveError, "the function <lambda> answered 'q', which is no reference;"),
+    (lambda t, v: 1.0, SolveError, "the function <lambda> answered 1.0, expected {name: value} of"),
     (lambda t, v: {"q_ref": [1.0, 2.0]}, SolveError, "answered q_ref = [1.0, 2.0], expected numbers, 1"),
     (lambda t, v: {"q_ref": None}, SolveError, "answered q_ref = None, expected numbers, 1"),
     (lambda t, v: {"q_ref": "0.5"}, SolveError, "answered q_ref = '0.5', expected numbers, 1"),
     (lambda t, v: {"q_ref": [None]}, SolveError, "answered q_ref = [None], expected numbers, 1"),
     (lambda t, v: {"q_ref": 1j}, SolveError, "answered q_ref = 1j, expected numbers, 1"),
-    (
-        lambda t, v: {"q_ref": v["qq"]},
-        SolveError,
-        "the function <lambda> raised KeyError: 'qq'; mend it (at t = 0 s)",
-    ),
+    (lambda t, v: {"q_ref": v["qq"]}, SolveError, "the function <lambda> raised KeyError: 'qq'; mend it"),
     ("law.so", ModelError, "controller: found no file law.so, expected a shared library"),
     ("law.exe", ModelError, "law.exe"),
-    (
-        3,
-        ModelError,
-        "controller: found 3, expected a function of t and values, a model, an FMU file, a shared library",
-    ),
+    (3, ModelError, "controller: found 3, expected a function of t and values, a model, an FMU file, a"),
 ]
 
 
@@ -194,10 +178,7 @@ def test_a_law_that_fails_on_the_way_leaves_what_was_run(plant, tmp_path):
     [
         (dict(values="q speed"), "controller: law.so names 'speed', expected one of those that there are"),
         (dict(references="f"), "controller: law.so names 'f', expected one of those that there are"),
-        (
-            dict(references=""),
-            "controller: law.so gives no reference, expected names in gantrytau_references",
-        ),
+        (dict(references=""), "controller: law.so gives no reference, expected names in"),
         (dict(code="5"), "controller: law.so answered 5 in sample 0 at t = 0 s, expected 0"),
     ],
 )
@@ -217,14 +198,8 @@ def test_a_library_without_the_names_is_refused(tmp_path, plant):
     ("wires", "said"),
     [
         ({}, "controller.nominal: found no 'nominal' among what is known"),
-        (
-            WIRES | {"delta": "stream.beta"},
-            "controller.delta: found no 'stream.beta' among what is known; did you mean",
-        ),
-        (
-            WIRES | {"delta": "f_activate"},
-            "controller.delta: found 1 in m, expected 1 in 1, as f_activate has",
-        ),
+        (WIRES | {"delta": "stream.beta"}, "controller.delta: found no 'stream.beta' among what is known;"),
+        (WIRES | {"delta": "f_activate"}, "controller.delta: found 1 in m, expected 1 in 1, as f_activate"),
         (WIRES | {"detla": "q"}, "wires: the controller has no 'detla'; did you mean 'delta'?"),
         (WIRES | {"q_ref": "f"}, "controller.q_ref: found no 'f' among the references; there is q_ref."),
     ],

@@ -108,33 +108,15 @@ def test_replaced_in_a_run_the_way_to_the_new_axes_is_a_ramp():
 
 REFUSED = [
     (dict(limits={"q": AxisLimits()}), "limits: the plant has no input 'q'; there is q_ref."),
-    (
-        dict(limits={"q_ref": AxisLimits(speed=0.0)}),
-        "limits q_ref: found speed=0.0, expected numbers above zero",
-    ),
-    (
-        dict(limits={"q_ref": AxisLimits([1, 2, 3])}),
-        "limits q_ref: found [1, 2, 3], expected a number, or 2 of them",
-    ),
+    (dict(limits={"q_ref": AxisLimits(speed=0.0)}), "limits q_ref: found speed=0.0, expected numbers above"),
+    (dict(limits={"q_ref": AxisLimits([1, 2, 3])}), "limits q_ref: found [1, 2, 3], expected a number, or"),
     (dict(limits={"q_ref": AxisLimits("low")}), "limits q_ref: found 'low', expected a number, or 2 of them"),
-    (
-        dict(limits={"q_ref": AxisLimits(math.nan)}),
-        "limits q_ref: found nan, expected a number, or 2 of them",
-    ),
-    (
-        dict(limits={"q_ref": AxisLimits(1, 0)}),
-        "limits q_ref: found minimum above maximum, expected it below",
-    ),
-    (
-        dict(limits={"q_ref": AxisLimits(0.1)}),
-        "found q_ref[0] = 0 at the start, expected a number in [0.1, inf]",
-    ),
+    (dict(limits={"q_ref": AxisLimits(math.nan)}), "limits q_ref: found nan, expected a number, or 2 of"),
+    (dict(limits={"q_ref": AxisLimits(1, 0)}), "limits q_ref: found minimum above maximum, expected it"),
+    (dict(limits={"q_ref": AxisLimits(0.1)}), "found q_ref[0] = 0 at the start, expected a number in [0.1,"),
     (dict(references={"q": 0.0}), "references: there is no 'q'; there is q_ref."),
     (dict(kinematics=turned(0.0)), "references: found no 'r_ref', expected the pose to begin with"),
-    (
-        dict(kinematics=turned(0.0), references={"r_ref": [3.0, 0.0]}),
-        "beyond 1 m, expected a reachable start",
-    ),
+    (dict(kinematics=turned(0.0), references={"r_ref": [3.0, 0.0]}), "beyond 1 m, expected a reachable"),
     (
         dict(kinematics=ExternalKinematics(np.array, POSE, ["axes"]), references={"r_ref": [0.0, 0.0]}),
         "kinematics: the plant has no input 'axes'",

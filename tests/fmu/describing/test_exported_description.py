@@ -11,10 +11,10 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
 
 from gantrytau import Input, Model, Output, Parameter, Real, cos, der, sin, time, translate
 from gantrytau.border.refusal import ModelError
-from gantrytau_fmu import export_fmu
+from gantrytau_fmu import Build, export_fmu
 from gantrytau_fmu.describing.model_description import model_description
 from gantrytau_fmu.describing.model_structure import written_structure
-from gantrytau_fmu.description import Experiment, FmuDescription
+from gantrytau_fmu.description import DefaultExperiment, FmuDescription
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_models import Pendulum
 from tests.fmu.exported import MODELS, Exported, Numbers
@@ -53,13 +53,18 @@ class Described(Model):
 
 @pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
 def fmu(request, tmp_path_factory) -> Exported:
-    words: dict[str, Any] = dict(description="A <test> & more", author="A. Author", copyright="(c) A. Author")
-    words |= dict(license="MIT", version="1.2")
-    experiment = Experiment(start=0.5, stop=4.0, tolerance=1e-7, step=0.002)
+    build = Build(
+        description="A <test> & more",
+        author="A. Author",
+        copyright="(c) A. Author",
+        license="MIT",
+        version="1.2",
+        experiment=DefaultExperiment(start=0.5, stop=4.0, tolerance=1e-7, step=0.002),
+    )
     path = tmp_path_factory.mktemp("described") / "described.fmu"
     dae = translate(Described())
-    words |= dict(find=["motor.w", "phi", "energy", "clock", "both"])
-    export_fmu(dae, path, fmi="2.0" if request.param == 2 else "3.0", experiment=experiment, **words)  # pyright: ignore[reportArgumentType]
+    find = ["motor.w", "phi", "energy", "clock", "both"]
+    export_fmu(dae, path, fmi="2.0" if request.param == 2 else "3.0", find=find, build=build)
     return Exported(path, dae, request.param)
 
 
@@ -133,7 +138,7 @@ def test_head_experiment_and_words_of_the_caller(fmu):
     assert (told.license, told.version, told.modelName) == ("MIT", "1.2", "Described")
     e = told.defaultExperiment
     found = [float(text) for text in (e.startTime, e.stopTime, e.tolerance, e.stepSize)]
-    assert found == list(asdict(Experiment(0.5, 4.0, 1e-7, 0.002)).values())
+    assert found == list(asdict(DefaultExperiment(0.5, 4.0, 1e-7, 0.002)).values())
     told = [category.name for category in told.logCategories]
     assert told == ["logEvents", "logCalls", "logStatusWarning", "logStatusError"]
 
@@ -153,7 +158,9 @@ def test_what_is_written_is_read_back_as_the_same_record(name, fmi, tmp_path, mo
     model = MODELS.get(name, Described)()
     platforms = ("native",) if name == "compiled" else ()
     found: Any = read_fmu(
-        export_fmu(model, tmp_path / "model.fmu", fmi=fmi, platforms=platforms, author="A. Author")
+        export_fmu(
+            model, tmp_path / "model.fmu", fmi=fmi, build=Build(platforms=platforms, author="A. Author")
+        )
     )
     (told,) = written
     # no file tells a variable without dimension from one without unit
@@ -275,7 +282,7 @@ def test_choices_of_the_caller(tmp_path):
     """interfaces, solver, sources, find, states: each shows in the file."""
     path = tmp_path / "chosen.fmu"
     options: dict[str, Any] = dict(
-        solver="rodas4", sources=False, find=["v_x", "tension"], states=["x", "v_x"]
+        solver="rodas4", build=Build(sources=False), find=["v_x", "tension"], states=["x", "v_x"]
     )
     export_fmu(Pendulum(), path, interfaces="model-exchange", **options)
     told: Any = read_model_description(path)

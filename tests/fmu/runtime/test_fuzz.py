@@ -13,7 +13,7 @@ from tests.fmu.runtime.robust_models import MAKERS, SANITIZERS, compiler, driver
 
 SECONDS = float(os.environ.get("GANTRYTAU_FUZZ_SECONDS", "0"))
 FEW = ("pendulum", "sledge", "juggled", "parallelogram", "root", "lags")
-CALLS = 15_000 if SECONDS else 4_000
+CALLS = 15_000 if SECONDS else 2_000
 
 
 def program(model):

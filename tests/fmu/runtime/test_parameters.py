@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from gantrytau import Dae, Input, Model, Output, Parameter, Real, der, sampled, translate
-from gantrytau_models import FourBar, GantryTau, Pendulum, SixLinkGantryTau, prototypes
+from gantrytau_models import FourBar, GantryTau, Pendulum, prototypes
 from tests.fmu.exported import Numbers, Running, export
 from tests.fmu.runtime.raw_calls import ERROR, OK
 
 STEP = 0.004
 L1 = prototypes.L1
-CARTS = [{}, dict(m=20.0), {}]
 TURNED = [0.99, -0.05, 0.01]  # one and a half degrees from where it was, and not of length one
 
 # model -> parameters by name, and the same model with these values from the start
@@ -31,10 +30,6 @@ VALUES: dict[str, Any] = {
             carts=[{}, dict(m=20.0), {}],
             arms=[dict(length=2.09), {}, dict(offset=[-1.8086, 3.25, -1.4434])],
         ),
-    ),
-    "six-link": (
-        {"carts[1].m": 20.0, "world.g": 5.0},
-        lambda: SixLinkGantryTau(L1, carts=CARTS, world=dict(g=5.0)),
     ),
 }
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from gantrytau import InitializationError, ModelError, SolveError
+from gantrytau_fmu import Master, cosimulate
 from gantrytau_fmu.systems.connected_system import build_system
-from gantrytau_fmu.systems.cosimulate import _read, _structure, cosimulate
+from gantrytau_fmu.systems.cosimulate import _read, _structure
 from gantrytau_fmu.systems.step_order import sequence_of
 from tests.fmu.systems.coupled_masses import WIRES, C, K, exact, first, second
 from tests.fmu.systems.small_fmus import variable
@@ -22,7 +23,7 @@ def gain(build, name="g", code="v[2] = v[0] * v[1];", start=2.0, **more):
 
 
 def error(files, step, **policy):
-    found = cosimulate(files, WIRES, stop=1.0, step=step, **policy)
+    found = cosimulate(files, WIRES, stop=1.0, step=step, master=Master(**policy))
     return np.max(abs(found["a.x"] - exact(found.time)[0]))
 
 
@@ -43,7 +44,13 @@ def test_gauss_seidel_is_better_than_jacobi(halves):
 
 def test_iteration_ends_where_inputs_and_outputs_agree_whatever_the_order_of_the_components(halves):
     runs = [
-        cosimulate(halves, WIRES, stop=0.5, step=4e-3, order="iterate", agreement=1e-12, sequence=sequence)
+        cosimulate(
+            halves,
+            WIRES,
+            stop=0.5,
+            step=4e-3,
+            master=Master(order="iterate", agreement=1e-12, sequence=sequence),
+        )
         for sequence in (["a", "b"], ["b", "a"])
     ]
     assert np.max(abs(runs[0]["a.x"] - runs[1]["a.x"])) < 1e-11  # agreement, over 125 steps
@@ -75,24 +82,26 @@ def test_inputs_show_what_drives_them_and_names_have_units(halves):
 def test_components_take_steps_of_their_own(halves):
     errors = []
     for step in (2e-3, 1e-3):
-        found = cosimulate(halves, WIRES, stop=1.0, step=step, steps={"a": 4 * step, "b": step / 2})
+        found = cosimulate(
+            halves, WIRES, stop=1.0, step=step, master=Master(steps={"a": 4 * step, "b": step / 2})
+        )
         errors.append(np.max(abs(found["a.x"][::4] - exact(found.time)[0][::4])))
     assert errors[1] < 5e-3
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.2)  # first order
-    fine = cosimulate(halves, WIRES, stop=1.0, step=4e-3, steps={"a": 1e-3, "b": 2e-3})
+    fine = cosimulate(halves, WIRES, stop=1.0, step=4e-3, master=Master(steps={"a": 1e-3, "b": 2e-3}))
     same = cosimulate(halves, WIRES, stop=1.0, step=4e-3)  # inputs are held, and both are exact then
     assert np.max(abs(fine["a.x"] - same["a.x"])) < 1e-12
 
 
 def test_a_slow_jacobi_component_is_seen_when_its_interval_ends(halves):
-    found = cosimulate(halves, WIRES, stop=0.04, step=1e-3, order="jacobi", steps={"a": 4e-3})
+    found = cosimulate(halves, WIRES, stop=0.04, step=1e-3, master=Master(order="jacobi", steps={"a": 4e-3}))
     assert np.all(found["a.x"][:4] == 0.1)
     assert found["a.x"][4] != 0.1
 
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_the_estimated_error_is_the_error(halves, order):
-    found = cosimulate(halves, WIRES, stop=1.0, step=1e-3, order=order, error_estimate=True)
+    found = cosimulate(halves, WIRES, stop=1.0, step=1e-3, master=Master(order=order, error_estimate=True))
     true = abs(found["a.x"] - exact(found.time)[0])
     assert np.max(found["error(a.x)"]) == pytest.approx(
         np.max(true), rel=0.05
@@ -132,12 +141,14 @@ def test_the_last_step_is_shorter_if_components_can(build):
 
 def test_an_algebraic_loop_is_solved(build):
     files = {"g": gain(build), "h": gain(build, "h", "v[2] = 1 - v[1] * v[0];", 3.0)}
-    found = cosimulate(files, [("g.y", "h.u"), ("h.y", "g.u")], stop=0.1, step=0.1, order="jacobi")
+    found = cosimulate(
+        files, [("g.y", "h.u"), ("h.y", "g.u")], stop=0.1, step=0.1, master=Master(order="jacobi")
+    )
     assert found["g.u"][0] == pytest.approx(
         1 / 7, abs=1e-9
     )  # u = 1 - 3 (2 u), though carrying round diverges
     curved = {"g": gain(build, "curved", "v[2] = v[1] * exp(-v[0]);", 5.0)}
-    found = cosimulate(curved, [("g.y", "g.u")], stop=0.1, step=0.1, order="jacobi")
+    found = cosimulate(curved, [("g.y", "g.u")], stop=0.1, step=0.1, master=Master(order="jacobi"))
     assert found["g.u"][0] * np.exp(found["g.u"][0]) == pytest.approx(5.0, abs=1e-8)
 
 
@@ -154,7 +165,9 @@ def test_iteration_that_does_not_agree_says_where(halves):
     with pytest.raises(
         SolveError, match=r"after 2 iterations at t = 0 s .*[ab]\.[uf] was .*, is .*; take"
     ) as caught:
-        cosimulate(halves, WIRES, stop=1.0, step=0.1, order="iterate", iterations=2, agreement=1e-12)
+        cosimulate(
+            halves, WIRES, stop=1.0, step=0.1, master=Master(order="iterate", iterations=2, agreement=1e-12)
+        )
     assert caught.value.time == 0.0
 
 
@@ -163,9 +176,9 @@ def test_iteration_needs_saved_states(build, halves):
     with pytest.raises(
         ModelError, match=r"a: .*forgetful2.fmu cannot save .* order='iterate' needs; take 'gauss-seidel'"
     ):
-        cosimulate(files, WIRES, stop=1.0, step=0.1, order="iterate")
+        cosimulate(files, WIRES, stop=1.0, step=0.1, master=Master(order="iterate"))
     with pytest.raises(ModelError, match=r"steps: a would step less often .*order='iterate'"):
-        cosimulate(halves, WIRES, stop=1.0, step=0.1, order="iterate", steps={"a": 0.2})
+        cosimulate(halves, WIRES, stop=1.0, step=0.1, master=Master(order="iterate", steps={"a": 0.2}))
 
 
 def test_units_are_converted_or_refused(build, halves):
@@ -227,7 +240,7 @@ def test_an_interrupted_simulation_keeps_what_there_is(halves):
     with pytest.raises(
         SolveError, match=r"co-simulation interrupted at t = 0\.4 s; \.result holds"
     ) as caught:
-        cosimulate(halves, WIRES, stop=1.0, step=0.1, progress=press)
+        cosimulate(halves, WIRES, stop=1.0, step=0.1, master=Master(progress=press))
     assert caught.value.result.time[-1] == pytest.approx(0.4)
     assert isinstance(caught.value.__context__, KeyboardInterrupt)
 
@@ -252,7 +265,7 @@ def test_sampled_components_step_first_and_those_with_feedthrough_last(build):
         ("force.y", "plant.f"),
     ]
     with tempfile.TemporaryDirectory() as folder:
-        parts = _read(_structure(files, wires, Path(folder)).components, Path(folder), ())
+        parts = _read(_structure(files, wires, Path(folder)).components, Path(folder), Master())
         system = build_system(parts, wires, {}, {}, (0.0, 1.0))
     assert sequence_of(system) == ("controller", "plant", "reference", "filter", "force")
     assert sequence_of(system, list(files)) == tuple(files)

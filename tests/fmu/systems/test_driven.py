@@ -26,7 +26,7 @@ from gantrytau import (
     white_noise,
 )
 from gantrytau.commands.app import app
-from gantrytau_fmu import cosimulate, export_fmu
+from gantrytau_fmu import Master, cosimulate, export_fmu
 from gantrytau_fmu.systems.drives import Drive, between
 from gantrytau_fmu.systems.run_fmu import run_fmu
 from tests.fmu.systems.small_fmus import variable
@@ -65,7 +65,7 @@ def integrator(build, name, **more):
 def test_a_pulse_between_two_points_is_not_lost(build, fmi, even, samples, order):
     name = f"integrator{fmi[0]}{'even' * even}"
     file = integrator(build, name, fmi=fmi, even=even)
-    found = cosimulate({"a": file}, stop=1.0, step=0.25, inputs={"a.u": samples}, order=order)
+    found = cosimulate({"a": file}, stop=1.0, step=0.25, inputs={"a.u": samples}, master=Master(order=order))
     jump = np.where(found.time > 0.3, 1.0, 0.0)
     np.testing.assert_allclose(
         found["a.y"], found.time + jump, atol=3e-6 + 1e-9

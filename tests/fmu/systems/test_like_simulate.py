@@ -81,10 +81,13 @@ def test_between_events_as_well(fmus, simulated):
 
 
 def test_a_system_that_one_component_ends(fmus):
-    from gantrytau_fmu import cosimulate
+    from gantrytau_fmu import Master, cosimulate
 
     found = cosimulate(
-        {"tank": fmus[Tank, "3.0"], "ball": fmus[Ball, "2.0"]}, stop=STOP, step=0.15, isolate=["tank"]
+        {"tank": fmus[Tank, "3.0"], "ball": fmus[Ball, "2.0"]},
+        stop=STOP,
+        step=0.15,
+        master=Master(isolate=["tank"]),
     )
     assert found.ended == "the tank is empty: 100 % of what may flow"
     assert found.time[-1] == pytest.approx(0.9)  # the last point before 1 s

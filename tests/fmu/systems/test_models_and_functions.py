@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Input, Model, ModelError, Output, Parameter, Real, SolveError, der
-from gantrytau_fmu import Channel, PythonComponent, cosimulate, export_fmu
+from gantrytau_fmu import Channel, Master, PythonComponent, cosimulate, export_fmu
 
 A, STEP = 2.0, 0.1
 WIRES = [("tank.y", "law.y"), ("law.u", "tank.u")]
@@ -50,7 +50,7 @@ def test_a_model_under_a_sampled_function_follows_its_difference_equation(tank):
 
 
 def test_a_model_is_the_fmu_that_it_becomes(tank):
-    options: dict[str, Any] = dict(stop=0.5, step=STEP, tolerance=1e-10)
+    options: dict[str, Any] = dict(stop=0.5, step=STEP, master=Master(tolerance=1e-10))
     of_model = cosimulate({"tank": Tank(), "law": sampled_law()}, WIRES, **options)
     of_file = cosimulate({"tank": tank, "law": sampled_law()}, WIRES, **options)
     assert np.array_equal(of_model["tank.y"], of_file["tank.y"])
@@ -87,15 +87,9 @@ def test_vectors_and_parameters_come_by_name(tank):
 REFUSED = [
     (lambda t, v: {"v": 1.0}, "law: the function <lambda> answered ['v'], expected {name: value} of u"),
     (lambda t, v: 3.0, "law: the function <lambda> answered 3.0, expected {name: value} of u"),
-    (
-        lambda t, v: {"u": [1.0, 2.0]},
-        "law: the function <lambda> answered u = [1.0, 2.0], expected numbers, 1",
-    ),
+    (lambda t, v: {"u": [1.0, 2.0]}, "law: the function <lambda> answered u = [1.0, 2.0], expected"),
     (lambda t, v: {"u": "fast"}, "law: the function <lambda> answered u = 'fast', expected numbers, 1"),
-    (
-        lambda t, v: {"u": 1 / 0},
-        "law: the function <lambda> raised ZeroDivisionError: division by zero; mend it",
-    ),
+    (lambda t, v: {"u": 1 / 0}, "law: the function <lambda> raised ZeroDivisionError: division by zero;"),
     (lambda t, v: {"u": math.nan}, "law: found law.u = nan at t = 0.1 s, expected finite values"),
 ]
 
@@ -109,20 +103,17 @@ def test_what_a_function_does_wrong_is_said_with_its_name_and_time(tank, functio
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("master", "said"),
     [
-        (dict(isolate=True), "isolate: law is a Python function, expected an FMU"),
-        (dict(isolate=["law"]), "isolate: law is a Python function, expected an FMU"),
-        (
-            dict(error_estimate=True),
-            "error_estimate: law is a Python function, which a second run would find",
-        ),
-        (dict(order="iterate"), "law: law cannot save and restore its state, which order='iterate' needs"),
+        (Master(isolate=True), "isolate: law is a Python function, expected an FMU"),
+        (Master(isolate=["law"]), "isolate: law is a Python function, expected an FMU"),
+        (Master(error_estimate=True), "error_estimate: law is a Python function, which a second run would"),
+        (Master(order="iterate"), "law: law cannot save and restore its state, which order='iterate' needs"),
     ],
 )
-def test_what_a_function_cannot_do_is_refused_by_name(tank, options, said):
+def test_what_a_function_cannot_do_is_refused_by_name(tank, master, said):
     with pytest.raises(ModelError) as error:
-        cosimulate({"tank": tank, "law": sampled_law()}, WIRES, stop=1.0, step=STEP, **options)
+        cosimulate({"tank": tank, "law": sampled_law()}, WIRES, stop=1.0, step=STEP, master=master)
     assert said in str(error.value)
 
 

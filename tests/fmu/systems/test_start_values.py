@@ -50,7 +50,7 @@ def test_start_values_outside_of_the_limits_are_refused(build, tmp_path, fmi, li
     file = with_limits(spring(build, fmi), tmp_path, "k", *limits)
     for value in good:
         cosimulate({"a": file}, stop=0.1, step=0.1, start={"a.k": value})
-    with pytest.raises(ModelError, match=rf"start a\.k: {words}"):
+    with pytest.raises(ModelError, match=rf"start: a\.k: {words}"):
         cosimulate({"a": file}, stop=0.1, step=0.1, start={"a.k": bad})
 
 
@@ -87,10 +87,10 @@ def test_a_component_by_itself_and_inputs_that_are_given_are_silent(build):
 def test_what_cannot_be_set_says_what_can(build):
     lines = [variable("y", "output"), variable("x", "local", 1.0), variable("w", "local")]
     with pytest.raises(
-        ModelError, match=r"start a\.y is .*, expected .* variable with a start value, such as x$"
+        ModelError, match=r"start: a\.y: .*, expected .* variable with a start value, such as x$"
     ):
         cosimulate({"a": build("states", lines)}, stop=1.0, step=0.1, start={"a.y": 1.0})
-    with pytest.raises(ModelError, match=r"inputs a\.u: a has no variable 'u'; it has no input$"):
+    with pytest.raises(ModelError, match=r"inputs: a\.u: a has no variable 'u'; it has no input$"):
         cosimulate({"a": build("states", lines)}, stop=1.0, step=0.1, inputs={"a.u": 1.0})
 
 
@@ -98,7 +98,7 @@ def test_what_cannot_be_set_says_what_can(build):
 def test_start_values_may_bring_their_units(build, fmi):
     system = {"a": spring(build, fmi)}
     assert cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 N/mm"}).final("a.y") == 2000.0
-    with pytest.raises(ModelError, match=r"start a\.k: found '2 mm', a length, expected a stiffness in N/m"):
+    with pytest.raises(ModelError, match=r"start: a\.k: found '2 mm', a length, expected a stiffness in N/m"):
         cosimulate(system, stop=0.1, step=0.1, start={"a.k": "2 mm"})
 
 
@@ -112,7 +112,7 @@ def test_an_fmu_in_other_units_is_given_them(build, fmi):
     )
     driven = cosimulate(system, stop=0.1, step=0.1, inputs={"a.u": Samples([0.0, 0.1], [2.0, 2.0], unit="m")})
     assert driven.final("a.y") == 2020.0
-    with pytest.raises(ModelError, match=r"start a\.T: found '1 m', a length, expected a temperature in K"):
+    with pytest.raises(ModelError, match=r"start: a\.T: found '1 m', a length, expected a temperature in K"):
         cosimulate(system, stop=0.1, step=0.1, start={"a.T": "1 m"})
-    with pytest.raises(ModelError, match=r"start a\.odd: found '1 m', expected numbers in 'furlong'"):
+    with pytest.raises(ModelError, match=r"start: a\.odd: found '1 m', expected numbers in 'furlong'"):
         cosimulate(system, stop=0.1, step=0.1, start={"a.odd": "1 m"})

@@ -13,6 +13,7 @@ from gantrytau.mechanics.multibody import (
     Spherical,
     World,
 )
+from tests.mechanisms.rows import in_a_row, row
 from tests.references import free_body
 from tests.references.rotations import turn
 
@@ -143,8 +144,7 @@ class Assembled(Model):
     other = Body(m=1.1, r_cm=[0.1, 0.0, 0.3], J=np.diag([0.05, 0.07, 0.09]))
 
     def equations(self):
-        yield connect(self.body.frame_a, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.ball.frame_a)
+        yield from row(self.body, self.bar, self.ball)
         yield connect(self.body.frame_a, self.turned.frame_b)
         yield connect(self.turned.frame_a, self.other.frame_a)
 
@@ -193,12 +193,9 @@ class Linked(Model):
     ball = Spherical()
 
     def equations(self):
-        yield connect(self.bodies[0].frame_a, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.bodies[1].frame_a)
-        yield connect(self.bodies[1].frame_a, self.far.frame_a)
-        yield connect(self.far.frame_b, self.ball.frame_a)
-        yield connect(self.ball.frame_b, self.bodies[2].frame_a)
+        yield from row(
+            self.bodies[0], self.bar, self.hinge, self.bodies[1], self.far, self.ball, self.bodies[2]
+        )
 
 
 def test_linked_bodies_without_a_ground_keep_momentum_and_energy():
@@ -222,14 +219,9 @@ def test_linked_bodies_without_a_ground_keep_momentum_and_energy():
 def test_an_inertia_that_nobody_gave_is_told():
     """A pendulum of 1 kg at 0.3 m swings at sqrt(g / l) as a point mass; the inertia that is assumed doubles its square."""
 
-    class Swinging(Model):
-        world = World()
-        hinge = Revolute(n=[0.0, 1.0, 0.0])
-        body = Body(m=1.0, r_cm=[0.0, 0.0, -0.3])
-
-        def equations(self):
-            yield connect(self.world.frame_b, self.hinge.frame_a)
-            yield connect(self.hinge.frame_b, self.body.frame_a)
+    Swinging = in_a_row(
+        "Swinging", world=World(), hinge=Revolute(n=[0.0, 1.0, 0.0]), body=Body(m=1.0, r_cm=[0.0, 0.0, -0.3])
+    )
 
     (line,) = check(Swinging()).assumed
     assert line.startswith("body.J: nobody gave the inertia, 0.1 kg.m2 about each axis is taken; give J")

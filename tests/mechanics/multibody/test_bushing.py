@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gantrytau import Fixed, Model, ModelError, connect, linearize, simulate, translate
+from gantrytau import Fixed, Model, ModelError, linearize, simulate, translate
 from gantrytau.mechanics.multibody import Body, Bushing, FixedRotation, World
+from tests.mechanisms.rows import row
 from tests.references.rotations import turn
 
 TOLERANCE = 1e-10
@@ -23,8 +24,7 @@ class Mounted(Model):
     mount = Bushing(**SOFT)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.mount.frame_a)
-        yield connect(self.mount.frame_b, self.block.frame_a)
+        yield from row(self.world, self.mount, self.block)
 
 
 def quaternion(vector):
@@ -122,10 +122,8 @@ def test_the_other_way_round_and_turned_it_is_the_same_motion():
         def equations(self):
             a, b = self.mount.frame_a, self.mount.frame_b
             a, b = (b, a) if self.turned else (a, b)
-            yield connect(self.world.frame_b, self.before.frame_a)
-            yield connect(self.before.frame_b, a)
-            yield connect(b, self.after.frame_a)
-            yield connect(self.after.frame_b, self.block.frame_a)
+            yield from row(self.world, self.before, a)
+            yield from row(b, self.after, self.block)
 
     gentle = dict(r=Fixed([0.1, 0.2, -0.1]), v=Fixed([0.3, 0.1, 0.0]), w=Fixed([1.0, -0.6, 0.3]))
 

@@ -16,6 +16,7 @@ from gantrytau.mechanics.multibody import (
     World,
     WorldForce,
 )
+from tests.mechanisms.rows import row
 from tests.references.rotations import random_rotation, turn
 
 TOLERANCE = 1e-8
@@ -32,8 +33,7 @@ class Dropped(Model):
     contact = SurfaceContact(point=True)
 
     def equations(self):
-        yield connect(self.ground.frame_b, self.contact.frame_a)
-        yield connect(self.contact.frame_b, self.ball.frame_a)
+        yield from row(self.ground, self.contact, self.ball)
 
 
 def thrown(r, v):
@@ -160,8 +160,7 @@ class Rolling(Model):
     contact = SurfaceContact(radius=0.1, law=HuntCrossley(k=1e7, a=0.5))
 
     def equations(self):
-        yield connect(self.ground.frame_b, self.contact.frame_a)
-        yield connect(self.contact.frame_b, self.ball.frame_a)
+        yield from row(self.ground, self.contact, self.ball)
 
 
 def rolled(slope, mu, v_s=1e-5, stop=0.5):
@@ -193,8 +192,7 @@ def test_a_sphere_that_meets_both_frames_moving_gives_back_impulse_and_moment():
         contact = SurfaceContact(radius=0.1, mu=0.4, law=HuntCrossley(k=1e6))
 
         def equations(self):
-            yield connect(self.plate.frame_a, self.contact.frame_a)
-            yield connect(self.contact.frame_b, self.ball.frame_a)
+            yield from row(self.plate, self.contact, self.ball)
 
     R = random_rotation(np.random.default_rng(4))
     model = Meeting(

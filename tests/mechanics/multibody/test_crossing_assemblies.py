@@ -185,9 +185,7 @@ def test_constraints_that_are_lost_end_the_motion_where_it_happens(monkeypatch):
         return project(self, x, t, w)
 
     monkeypatch.setattr(Coordinates, "project", until)
-    with pytest.raises(
-        SolveError, match=r"stopped at t = 0\.1234 s: the constraints cannot be met"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"stopped at t = 0\.1234 s: the constraints cannot be") as caught:
         simulate(FourBar(), stop=1.0)
     assert caught.value.time == pytest.approx(0.1234, abs=1e-6)  # 2 ms in shortest steps
     assert caught.value.result.time[-1] == pytest.approx(0.122)  # the point before

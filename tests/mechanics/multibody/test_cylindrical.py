@@ -8,6 +8,7 @@ from gantrytau.mechanics import rotational, translational
 from gantrytau.mechanics.gears import BallScrew
 from gantrytau.mechanics.multibody import Body, Cylindrical, Prismatic, Revolute, World
 from tests.mechanics.multibody.test_loops import SliderCrank, crank_acceleration
+from tests.mechanisms.rows import row
 
 G = 9.81  # m/s2
 ROUNDING = 1e-10  # of blocks of a dozen linear equations, relative
@@ -23,8 +24,7 @@ class Nut(Model):
     body = Body(m=0.4, J=np.diag([0.02, 0.02, 0.03]))
 
     def equations(self):
-        yield connect(self.world.frame_b, self.joint.frame_a)
-        yield connect(self.joint.frame_b, self.body.frame_a)
+        yield from row(self.world, self.joint, self.body)
 
 
 class NutOnScrew(Nut):
@@ -67,8 +67,7 @@ class OneJoint(Model):
     twist = rotational.Torque(tau=-0.7)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.joint.frame_a)
-        yield connect(self.joint.frame_b, self.body.frame_a)
+        yield from row(self.world, self.joint, self.body)
         yield connect(self.push.flange, self.joint.axis_s)
         yield connect(self.twist.flange, self.joint.axis_phi)
 
@@ -83,9 +82,7 @@ class TwoJoints(Model):
     twist = rotational.Torque(tau=-0.7)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.slide.frame_a)
-        yield connect(self.slide.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.body.frame_a)
+        yield from row(self.world, self.slide, self.hinge, self.body)
         yield connect(self.push.flange, self.slide.axis)
         yield connect(self.twist.flange, self.hinge.axis)
 

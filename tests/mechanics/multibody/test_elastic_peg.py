@@ -14,6 +14,7 @@ from gantrytau.mechanics import multibody
 from gantrytau.mechanics.multibody import ElasticPegContact, Frame
 from gantrytau.mechanics.multibody.elastic_peg import Compliance, two_points
 from gantrytau.mechanics.multibody.orientation import of_quaternion, spin_of_quaternion
+from tests.mechanisms.rows import row
 
 LENGTH, BENDING, WALL, CLEARANCE, DEPTH, MU = 0.095, 236.0, 5e3, 3e-4, 0.03, 0.3
 FOUND = ["f", "t", "f_tip", "f_edge", "f_end", "inserted", "frame_a.f", "frame_a.t", "frame_b.f", "frame_b.t"]
@@ -182,8 +183,7 @@ class Free(Model):
     contact = ElasticPegContact()
 
     def equations(self):
-        yield connect(self.hole.frame_b, self.contact.frame_a)
-        yield connect(self.contact.frame_b, self.body.frame_a)
+        yield from row(self.hole, self.contact, self.body)
 
 
 def test_a_body_on_it_keeps_its_energy():

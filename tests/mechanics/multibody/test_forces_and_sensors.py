@@ -21,6 +21,7 @@ from gantrytau.mechanics.multibody import (
     WorldForce,
     WorldTorque,
 )
+from tests.mechanisms.rows import row
 from tests.references.rotations import skew, turn
 
 TILT = np.array([0.3, -0.8, 0.5])
@@ -101,8 +102,7 @@ class Sprung(Model):
     one, two = PointMass(m=2.0), PointMass(m=3.0)
 
     def equations(self):
-        yield connect(self.one.frame_a, self.line.frame_a)
-        yield connect(self.line.frame_b, self.two.frame_a)
+        yield from row(self.one, self.line, self.two)
         yield connect(self.line.flange_a, self.spring.flange_a)
         yield connect(self.line.flange_b, self.spring.flange_b)
 
@@ -151,12 +151,7 @@ class Measured(Model):
     relative, reverse = RelativeSensor(), RelativeSensor()
 
     def equations(self):
-        yield connect(self.world.frame_b, self.tilt.frame_a)
-        yield connect(self.tilt.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.cut.frame_a)
-        yield connect(self.cut.frame_b, self.body.frame_a)
-        yield connect(self.body.frame_a, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.pose.frame_a)
+        yield from row(self.world, self.tilt, self.hinge, self.cut, self.body, self.bar, self.pose)
         yield connect(self.tilt.frame_b, self.relative.frame_a)
         yield connect(self.bar.frame_b, self.relative.frame_b)
         yield connect(self.bar.frame_b, self.reverse.frame_a)

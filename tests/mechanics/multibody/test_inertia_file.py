@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Array, Model, ModelError, connect, simulate, translate
+from gantrytau import Array, Model, ModelError, simulate, translate
 from gantrytau.mechanics.multibody import Body, Fixed, Inertias, Revolute, World, read_inertias
+from tests.mechanisms.rows import row
 
 ELEMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 HEADER = "name, m [kg], x [mm], y [mm], z [mm], " + ", ".join(f"J{each} [kg.mm2]" for each in ELEMENTS)
@@ -26,8 +27,7 @@ class Arm(Model):
     bar = Body()
 
     def equations(self):
-        yield connect(self.base.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.bar.frame_a)
+        yield from row(self.base, self.hinge, self.bar)
 
 
 class Pair(Model):

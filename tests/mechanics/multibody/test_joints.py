@@ -16,6 +16,7 @@ from gantrytau.mechanics.multibody import (
     Universal,
     World,
 )
+from tests.mechanisms.rows import in_a_row, row
 from tests.references import chain as serial
 from tests.references.rotations import turn
 
@@ -35,8 +36,7 @@ class Driven(Model):
 
     def equations(self):
         yield self.motor.tau == self.tau
-        yield connect(self.bar.frame_b, self.joint.frame_a)
-        yield connect(self.joint.frame_b, self.body.frame_a)
+        yield from row(self.bar, self.joint, self.body)
         yield connect(self.motor.flange, self.joint.axis)
 
 
@@ -133,9 +133,7 @@ class DoublePendulum(Model):
     def equations(self):
         before = self.world.frame_b
         for hinge, bar, ball in zip(self.hinges, self.bars, self.balls, strict=True):
-            yield connect(before, hinge.frame_a)
-            yield connect(hinge.frame_b, bar.frame_a)
-            yield connect(bar.frame_b, ball.frame_a)
+            yield from row(before, hinge, bar, ball)
             before = bar.frame_b
 
 
@@ -166,8 +164,7 @@ class BallPendulum(Model):
     body = Body(m=2.0, r_cm=[0.0, 0.0, -0.7], J=np.diag([0.03, 0.03, 0.02]))
 
     def equations(self):
-        yield connect(self.world.frame_b, self.ball.frame_a)
-        yield connect(self.ball.frame_b, self.body.frame_a)
+        yield from row(self.world, self.ball, self.body)
 
 
 class ReversedBallPendulum(BallPendulum):
@@ -217,16 +214,13 @@ def test_gyroscope_precesses_at_the_rate_of_the_textbook():
     )  # sixty turns; measured 1e-6, falls with the tolerance
 
 
-class OnUniversal(Model):
-    """A body on a universal joint."""
-
-    world = World()
-    joint = Universal(n_a=[1.0, 0.2, 0.0], n_b=[0.0, 1.0, 0.5])
-    body = Body(m=1.3, r_cm=[0.1, 0.2, -0.5], J=np.diag([0.1, 0.2, 0.15]))
-
-    def equations(self):
-        yield connect(self.world.frame_b, self.joint.frame_a)
-        yield connect(self.joint.frame_b, self.body.frame_a)
+# A body on a universal joint.
+OnUniversal = in_a_row(
+    "OnUniversal",
+    world=World(),
+    joint=Universal(n_a=[1.0, 0.2, 0.0], n_b=[0.0, 1.0, 0.5]),
+    body=Body(m=1.3, r_cm=[0.1, 0.2, -0.5], J=np.diag([0.1, 0.2, 0.15])),
+)
 
 
 def test_universal_joint_is_two_revolute_joints():

@@ -18,6 +18,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from tests.families import first_of
+from tests.mechanisms.rows import row
 
 
 def test_a_loop_of_slides():
@@ -33,10 +34,8 @@ def test_a_loop_of_slides():
         wedge, weight = PointMass(m=2.0), PointMass(m=3.0)
 
         def equations(self):
-            yield connect(self.world.frame_b, self.ground.frame_a)
-            yield connect(self.ground.frame_b, self.wedge.frame_a)
-            yield connect(self.ground.frame_b, self.slope.frame_a)
-            yield connect(self.slope.frame_b, self.guide.frame_b)
+            yield from row(self.world, self.ground, self.wedge)
+            yield from row(self.ground, self.slope, self.guide.frame_b)
             yield connect(self.guide.frame_b, self.weight.frame_a)
             yield connect(self.guide.frame_a, self.world.frame_b)
 
@@ -65,12 +64,8 @@ class Parallel(Model):
             yield connect(self.world.frame_b, below.frame_a)
             yield connect(above.frame_a, self.bar.frame_a)
         for k, crank in enumerate(self.cranks):
-            yield connect(self.below[k].frame_b, self.lower[k].frame_a)
-            yield connect(self.lower[k].frame_b, crank.frame_a)
-            yield connect(crank.frame_b, self.upper[k].frame_a)
-            yield connect(self.upper[k].frame_b, self.above[k].frame_b)
-        yield connect(self.below[4].frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.above[4].frame_b)
+            yield from row(self.below[k], self.lower[k], crank, self.upper[k], self.above[k].frame_b)
+        yield from row(self.below[4], self.rod, self.above[4].frame_b)
 
 
 def test_parallel_cranks_and_rods_that_add_nothing_are_named():
@@ -97,11 +92,8 @@ class Spatial(TwoFrames):
     end = FixedRotation(n=[1.0, 0.0, 0.0], phi=twist)
 
     def equations(self):
-        yield connect(self.frame_a, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.body.frame_a)
-        yield connect(self.hinge.frame_b, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.end.frame_a)
-        yield connect(self.end.frame_b, self.frame_b)
+        yield from row(self.frame_a, self.hinge, self.body)
+        yield from row(self.hinge, self.bar, self.end, self.frame_b)
 
 
 LENGTHS, TWIST = (0.4, 0.7), 0.6
@@ -168,8 +160,7 @@ class Leg(TwoFrames):
     def equations(self):
         yield connect(self.frame_a, self.hinges[0].frame_a)
         for k, bar in enumerate(self.bars):
-            yield connect(self.hinges[k].frame_b, bar.frame_a)
-            yield connect(bar.frame_b, self.hinges[k + 1].frame_a)
+            yield from row(self.hinges[k], bar, self.hinges[k + 1])
         yield connect(self.hinges[2].frame_b, self.frame_b)
 
 
@@ -186,9 +177,7 @@ class Sarrus(Model):
 
     def equations(self):
         for leg, foot, top in zip(self.legs, self.feet, self.tops, strict=True):
-            yield connect(self.world.frame_b, foot.frame_a)
-            yield connect(foot.frame_b, leg.frame_a)
-            yield connect(leg.frame_b, top.frame_b)
+            yield from row(self.world, foot, leg, top.frame_b)
             yield connect(top.frame_a, self.plate.frame_a)
 
 
@@ -226,16 +215,13 @@ class SixBar(Model):
             (self.arm.frame_b, h[5], self.last),
         ]
         for body, (before, hinge, bar) in zip(self.bodies, ways, strict=True):
-            yield connect(before, hinge.frame_a)
-            yield connect(hinge.frame_b, bar.frame_a)
+            yield from row(before, hinge, bar)
             yield connect(hinge.frame_b, body.frame_a)
         for fixed in (self.ground, self.post):
             yield connect(self.world.frame_b, fixed.frame_a)
         yield connect(self.branch.frame_a, self.coupler.frame_a)
-        yield connect(self.rocker.frame_b, h[3].frame_a)
-        yield connect(h[3].frame_b, self.coupler.frame_b)
-        yield connect(self.last.frame_b, h[6].frame_a)
-        yield connect(h[6].frame_b, self.branch.frame_b)
+        yield from row(self.rocker, h[3], self.coupler.frame_b)
+        yield from row(self.last, h[6], self.branch.frame_b)
 
 
 def test_two_loops_that_share_bodies_keep_their_energy():
@@ -275,11 +261,9 @@ class Rocker(Model):
             (self.world, self.crank, self.near, self.one),
             (self.ground, self.rocker, self.far, self.two),
         ):
-            yield connect(before.frame_b, hinge.frame_a)
-            yield connect(hinge.frame_b, bar.frame_a)
+            yield from row(before, hinge, bar)
             yield connect(hinge.frame_b, body.frame_a)
-        yield connect(self.near.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.far.frame_b)
+        yield from row(self.near, self.rod, self.far.frame_b)
 
 
 class BallEnded(TwoFrames):
@@ -290,11 +274,9 @@ class BallEnded(TwoFrames):
     body = Body(m=1e-9, r_cm=[0.55, 0.0, 0.0], J=1e-10 * np.eye(3))
 
     def equations(self):
-        yield connect(self.frame_a, self.first.frame_a)
-        yield connect(self.first.frame_b, self.bar.frame_a)
+        yield from row(self.frame_a, self.first, self.bar)
         yield connect(self.first.frame_b, self.body.frame_a)
-        yield connect(self.bar.frame_b, self.last.frame_a)
-        yield connect(self.last.frame_b, self.frame_b)
+        yield from row(self.bar, self.last, self.frame_b)
 
 
 class Cardan(BallEnded):

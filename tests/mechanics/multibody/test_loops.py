@@ -21,12 +21,12 @@ from gantrytau.mechanics.multibody import (
 )
 from gantrytau.mechanics.multibody import Fixed as Mount
 from tests.families import first_of
+from tests.mechanisms.rows import row
 from tests.references import four_bar
 from tests.references.rotations import turn
 
-ROUNDING = (
-    1e-9  # of blocks that are solved after a Newton iteration to 1e-13, with condition numbers up to 1e3
-)
+# of blocks that are solved after a Newton iteration to 1e-13, with condition numbers up to 1e3
+ROUNDING = 1e-9
 NORMAL = [0.0, 0.0, 1.0]
 
 
@@ -39,10 +39,8 @@ class Link(TwoFrames):
     bar = FixedTranslation(r=lambda self: [self.L, 0.0, 0.0])
 
     def equations(self):
-        yield connect(self.frame_a, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.body.frame_a)
-        yield connect(self.hinge.frame_b, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.frame_b)
+        yield from row(self.frame_a, self.hinge, self.body)
+        yield from row(self.hinge, self.bar, self.frame_b)
 
 
 class FourBar(Model):
@@ -58,10 +56,7 @@ class FourBar(Model):
 
     def equations(self):
         yield connect(self.base.frame_b, self.ground.frame_a)
-        yield connect(self.base.frame_b, self.crank.frame_a)
-        yield connect(self.crank.frame_b, self.coupler.frame_a)
-        yield connect(self.coupler.frame_b, self.pin.frame_a)
-        yield connect(self.pin.frame_b, self.sensor.frame_a)
+        yield from row(self.base, self.crank, self.coupler, self.pin, self.sensor)
         yield connect(self.ground.frame_b, self.rocker.frame_a)
         yield connect(self.motor.flange, self.crank.hinge.axis)
         yield connect(self.sensor.frame_b, self.rocker.frame_b)
@@ -204,8 +199,7 @@ class Carried(Model):
 
     def equations(self):
         crank, coupler, rocker, pin = self.hinges
-        yield connect(self.world.frame_b, self.table.frame_a)
-        yield connect(self.table.frame_b, self.plate.frame_a)
+        yield from row(self.world, self.table, self.plate)
         yield connect(self.table.frame_b, self.ground.frame_a)
         for before, hinge, bar, body in zip(
             (self.table.frame_b, self.bars[0].frame_b, self.ground.frame_b),
@@ -214,11 +208,9 @@ class Carried(Model):
             self.bodies,
             strict=True,
         ):
-            yield connect(before, hinge.frame_a)
-            yield connect(hinge.frame_b, bar.frame_a)
+            yield from row(before, hinge, bar)
             yield connect(hinge.frame_b, body.frame_a)
-        yield connect(self.bars[2].frame_b, pin.frame_a)
-        yield connect(pin.frame_b, self.bars[1].frame_b)
+        yield from row(self.bars[2], pin, self.bars[1].frame_b)
 
 
 BARS = four_bar.FourBar(
@@ -319,14 +311,9 @@ class SliderCrank(Model):
     piston = PointMass(m=2.0)
 
     def equations(self):
-        yield connect(self.world.frame_b, self.crank.frame_a)
-        yield connect(self.crank.frame_b, self.wheel.frame_a)
-        yield connect(self.crank.frame_b, self.arm.frame_a)
-        yield connect(self.arm.frame_b, self.knee.frame_a)
-        yield connect(self.knee.frame_b, self.bar.frame_a)
-        yield connect(self.knee.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.wrist.frame_a)
-        yield connect(self.wrist.frame_b, self.rail.frame_b)
+        yield from row(self.world, self.crank, self.wheel)
+        yield from row(self.crank, self.arm, self.knee, self.bar)
+        yield from row(self.knee, self.rod, self.wrist, self.rail.frame_b)
         yield connect(self.rail.frame_b, self.piston.frame_a)
         yield connect(self.rail.frame_a, self.world.frame_b)
 

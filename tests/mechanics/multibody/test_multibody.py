@@ -17,6 +17,7 @@ from gantrytau.mechanics.multibody import (
     TwoFrames,
     World,
 )
+from tests.mechanisms.rows import row
 from tests.references.rotations import turn
 
 
@@ -35,10 +36,8 @@ class Crane(Model):
     load = Body(m=2.0, r_cm=[0.0, 0.0, -0.9], J=np.diag([0.1, 0.12, 0.05]))
 
     def equations(self):
-        yield connect(self.world.frame_b, self.rail.frame_a)
-        yield connect(self.rail.frame_b, self.trolley.frame_a)
-        yield connect(self.rail.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.load.frame_a)
+        yield from row(self.world, self.rail, self.trolley)
+        yield from row(self.rail, self.hinge, self.load)
 
 
 class ReversedCrane(Crane):
@@ -79,11 +78,8 @@ class Winch(Model):
     arm = Body(m=2.0, r_cm=[0.5, 0.0, 0.0], J=np.diag([0.0, 0.04, 0.04]) + 0.01 * np.eye(3))
 
     def equations(self):
-        yield connect(self.world.frame_b, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.arm.frame_a)
-        yield connect(self.motor.flange, self.rotor.flange_a)
-        yield connect(self.rotor.flange_b, self.gear.flange_a)
-        yield connect(self.gear.flange_b, self.hinge.axis)
+        yield from row(self.world, self.hinge, self.arm)
+        yield from row(self.motor, self.rotor, self.gear, self.hinge.axis)
         yield connect(self.spring.flange_a, self.hinge.support)
         yield connect(self.spring.flange_b, self.hinge.axis)
 
@@ -150,13 +146,10 @@ class Screwed(Model):
     spring = translational.Spring(c=300.0, s_rel0=0.1)
 
     def equations(self):
-        yield connect(self.motor.flange, self.spindle.flange_a)
-        yield connect(self.spindle.flange_b, self.screw.flange_a)
-        yield connect(self.screw.flange_b, self.rail.axis)
+        yield from row(self.motor, self.spindle, self.screw, self.rail.axis)
         yield connect(self.rail.support, self.spring.flange_a)
         yield connect(self.rail.axis, self.spring.flange_b)
-        yield connect(self.world.frame_b, self.rail.frame_a)
-        yield connect(self.rail.frame_b, self.slide.frame_a)
+        yield from row(self.world, self.rail, self.slide)
 
 
 def test_slide_on_a_ball_screw():
@@ -180,12 +173,9 @@ def test_a_fixed_rotation_from_either_side():
         balls = Array(PointMass, 2, m=2.0)
 
         def equations(self):
-            yield connect(self.world.frame_b, self.ahead.frame_a)
-            yield connect(self.ahead.frame_b, self.one.frame_a)
-            yield connect(self.one.frame_b, self.balls[0].frame_a)
+            yield from row(self.world, self.ahead, self.one, self.balls[0])
             yield connect(self.world.frame_b, self.back.frame_b)
-            yield connect(self.back.frame_a, self.other.frame_a)
-            yield connect(self.other.frame_b, self.balls[1].frame_a)
+            yield from row(self.back.frame_a, self.other, self.balls[1])
 
     at = translate(Turned()).evaluate()
     for ball, R in ((0, turn(about)), (1, turn(-about))):
@@ -204,10 +194,8 @@ class Arm(TwoFrames):
     bar = FixedTranslation(r=[0.5, 0.0, 0.0])
 
     def equations(self):
-        yield connect(self.frame_a, self.hinge.frame_a)
-        yield connect(self.hinge.frame_b, self.body.frame_a)
-        yield connect(self.hinge.frame_b, self.bar.frame_a)
-        yield connect(self.bar.frame_b, self.frame_b)
+        yield from row(self.frame_a, self.hinge, self.body)
+        yield from row(self.hinge, self.bar, self.frame_b)
 
 
 class Pair(TwoFrames):
@@ -217,9 +205,7 @@ class Pair(TwoFrames):
     tip = Frame()
 
     def equations(self):
-        yield connect(self.frame_a, self.one.frame_a)
-        yield connect(self.one.frame_b, self.two.frame_a)
-        yield connect(self.two.frame_b, self.frame_b)
+        yield from row(self.frame_a, self.one, self.two, self.frame_b)
         yield connect(self.frame_b, self.tip)
 
 
@@ -234,10 +220,8 @@ class Outside(Model):
 
     def equations(self):
         yield connect(self.world.frame_b, self.left.frame_a)
-        yield connect(self.world.frame_b, self.ground.frame_a)
-        yield connect(self.ground.frame_b, self.right.frame_a)
-        yield connect(self.left.tip, self.join.frame_a)
-        yield connect(self.join.frame_b, self.right.frame_b)
+        yield from row(self.world, self.ground, self.right)
+        yield from row(self.left.tip, self.join, self.right.frame_b)
         yield connect(self.right.tip, self.load.frame_a)
 
 

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from gantrytau import Fixed, Model, ModelError, connect, simulate, translate
 from gantrytau.mechanics import multibody
 from gantrytau.mechanics.multibody import Body, FrameForce, HuntCrossley, PegContact, World, WorldTorque
+from tests.mechanisms.rows import row
 
 TOLERANCE = 1e-9
 J = np.diag([2e-4, 2e-4, 1e-5])
@@ -24,8 +25,7 @@ class Peg(Model):
     push, twist = FrameForce(), WorldTorque()
 
     def equations(self):
-        yield connect(self.hole.frame_b, self.contact.frame_a)
-        yield connect(self.contact.frame_b, self.peg.frame_a)
+        yield from row(self.hole, self.contact, self.peg)
         yield connect(self.push.frame_b, self.peg.frame_a)
         yield connect(self.twist.frame_b, self.peg.frame_a)
 
@@ -119,10 +119,8 @@ def test_the_chamfer_leads_in_what_the_plane_stops():
             contact = PegContact(chamfer=chamfer, **parts)
 
             def equations(self):
-                yield connect(self.holder.frame_b, self.mount.frame_a)
-                yield connect(self.mount.frame_b, self.peg.frame_a)
-                yield connect(self.hole.frame_b, self.contact.frame_a)
-                yield connect(self.contact.frame_b, self.peg.frame_a)
+                yield from row(self.holder, self.mount, self.peg)
+                yield from row(self.hole, self.contact, self.peg)
 
         run = simulate(Led(peg=held([8e-4, 0, 2e-3])), stop=0.6, tolerance=1e-6)
         assert bool(run.final("contact.r")[2] < -0.018) is inside

@@ -14,6 +14,7 @@ from gantrytau.viewing.film import film_of
 from gantrytau.viewing.solids import solids
 from gantrytau_models import FourBar
 from tests.mechanics.urdf.urdf_texts import joint, link, read
+from tests.mechanisms.rows import row
 
 HERE = Path(__file__).parent
 HALF_TURN = np.pi
@@ -222,11 +223,8 @@ def test_the_same_tree_from_components_has_the_same_motion(tmp_path):
         )
 
         def equations(self):
-            yield connect(self.world.frame_b, self.rail.frame_a)
-            yield connect(self.rail.frame_b, self.cart.frame_a)
-            yield connect(self.rail.frame_b, self.bar.frame_a)
-            yield connect(self.bar.frame_b, self.pin.frame_a)
-            yield connect(self.pin.frame_b, self.bob.frame_a)
+            yield from row(self.world, self.rail, self.cart)
+            yield from row(self.rail, self.bar, self.pin, self.bob)
 
     known = simulate(Crane(), stop=1.0, starts={"pin.phi": 0.5}, tolerance=1e-10)
     assert np.ptp(known["rail.s"]) > 0.05

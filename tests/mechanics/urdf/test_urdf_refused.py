@@ -27,57 +27,27 @@ ARM = '<link name="base"/>' + link("arm")
     [
         ("", "found no <link>, expected one or more"),
         (ARM, "found 2 links that no joint carries (base, arm), expected one, the base"),
-        (
-            ARM + joint("q", "hinge", "base", "arm"),
-            "found joint 'q' is 'hinge', expected a kind of joint that is there",
-        ),
-        (
-            ARM + joint("q", "fixed", "base", "arms"),
-            "joins 'arms', expected a link that is there; did you mean 'arm'?",
-        ),
+        (ARM + joint("q", "hinge", "base", "arm"), "found joint 'q' is 'hinge'"),
+        (ARM + joint("q", "fixed", "base", "arms"), "joins 'arms', expected a link that is there"),
         (ARM + joint("q", "fixed", "base", "arm") * 2, "found two joints of the name 'q'"),
         (ARM + ARM, "found two links of the name"),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0 0"/>'),
-            "found the axis 0 0 0 of joint 'q'",
-        ),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0"/>'),
-            "xyz=\"0 0\" in the axis of joint 'q', expected 3",
-        ),
+        (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0 0"/>'), "found the axis 0 0 0 of"),
+        (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0"/>'), 'xyz="0 0" in the axis of'),
         (ARM + joint("q", "fixed", "base", "arm", '<origin xyz="0 nan 1"/>'), "expected 3 finite numbers"),
         (
             ARM + joint("q", "revolute", "base", "arm", '<limit lower="2" upper="1"/>'),
             'lower="2" above upper="1"',
         ),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<mimic joint="p"/>'),
-            "mimics 'p', expected a joint that is there",
-        ),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<mimic joint="q"/>'),
-            "expected another one that moves in one",
-        ),
+        (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="p"/>'), "mimics 'p', expected a"),
+        (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="q"/>'), "expected another one that"),
         (link("base") + joint("q", "fixed", "base", "base"), "found joints in a circle (q), expected a tree"),
         ('<link name="a"><inertial><mass value="-1"/></inertial></link>', "the mass -1 kg of link 'a'"),
-        (
-            '<link name="a"><inertial><inertia ixx="1"/></inertial></link>',
-            "found the <mass> of link 'a' without value=",
-        ),
-        (
-            '<link name="a"><visual><geometry><cone/></geometry></visual></link>',
-            "'cone', expected a shape that is there",
-        ),
+        ('<link name="a"><inertial><inertia ixx="1"/></inertial></link>', "found the <mass> of link 'a'"),
+        ('<link name="a"><visual><geometry><cone/></geometry></visual></link>', "'cone', expected a shape"),
         ("<link/>", "found a <link> without name="),
-        (
-            '<xacro:macro xmlns:xacro="x" name="m"/>',
-            "found macros of xacro, expected URDF; write it with `xacro",
-        ),
+        ('<xacro:macro xmlns:xacro="x" name="m"/>', "found macros of xacro, expected URDF"),
         ('<link name="a">', "found what is not XML"),
-        (
-            '<link name="base"/><link name="f"/>' + joint("q", "floating", "base", "f"),
-            "link 'f' without a mass floats",
-        ),
+        ('<link name="base"/><link name="f"/>' + joint("q", "floating", "base", "f"), "link 'f' without a"),
     ],
 )
 def test_what_is_no_urdf_is_refused_by_name(tmp_path, body, words):
@@ -110,10 +80,7 @@ LOOP = dict(link_a="rocker", link_b="coupler")
         (3, "found int, expected a TOML file"),
         ({"loops": []}, "'loops' in the file, expected loop, driven, start; did you mean 'loop'?"),
         ({"loop": [dict(link_a="rocker")]}, "loop[0] without link_b"),
-        (
-            {"loop": [dict(LOOP, link_b="couple")]},
-            "loop[0].link_b = 'couple', expected one that is there; did you mean 'coupler'?",
-        ),
+        ({"loop": [dict(LOOP, link_b="couple")]}, "loop[0].link_b = 'couple', expected one that is there"),
         ({"loop": [dict(LOOP, link_b="rocker")]}, "from rocker to itself"),
         ({"loop": [dict(LOOP, kind="ball")]}, "loop[0].kind = 'ball'"),
         ({"loop": [dict(LOOP, axis=[0, 0, 0])]}, "loop[0].axis = [0.0, 0.0, 0.0], expected a direction"),

@@ -7,12 +7,7 @@ from gantrytau import ModelError, translate
 from gantrytau_models import ForwardKinematics, GantryTau, InverseKinematics, prototypes
 from tests.models.mechanisms.test_gantry_tau import CARTS, mapped, random_motions, symmetric
 
-ROBOTS = {
-    "L1": prototypes.L1,
-    "D1": prototypes.D1,
-    "GT_A": prototypes.GT_A,
-    "symmetric": symmetric(),
-}
+ROBOTS = {"L1": prototypes.L1, "D1": prototypes.D1, "GT_A": prototypes.GT_A, "symmetric": symmetric()}
 
 
 @pytest.fixture(params=ROBOTS)
@@ -137,7 +132,7 @@ def test_carts_in_one_line_give_a_status():
 
 def test_what_is_no_prototype_is_refused():
     for model in (ForwardKinematics, InverseKinematics):
-        with pytest.raises(ModelError, match=rf"{model.__name__}: found 'L1', expected a prototype record"):
+        with pytest.raises(ModelError, match=f"{model.__name__}: found 'L1', expected a Prototype"):
             model("L1")  # pyright: ignore[reportArgumentType]
-        with pytest.raises(ModelError, match="expected a prototype record"):
+        with pytest.raises(ModelError, match="expected a Prototype"):
             model(prototypes.F1)  # pyright: ignore[reportArgumentType]

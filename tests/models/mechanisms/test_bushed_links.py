@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from gantrytau import InitializationError, Model, connect, linearize
+from gantrytau import InitializationError, Model, linearize
 from gantrytau.mechanics.multibody import Body, World
 from gantrytau_models import BushedSixLinkGantryTau, ElasticSixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.bushed_links import BushedRod
+from tests.mechanisms.rows import in_a_row
 
 RECORD = prototypes.L1
 PLACE = np.array([0.9, 2.7, -0.4])
@@ -14,16 +15,13 @@ MASS = 22.38  # kg, with a wrist
 FLOATING = dict(g=0.0)
 
 
-class Hung(Model):
-    """A load at the end of a rod."""
-
-    world = World(g=0.0)
-    rod = BushedRod(L=2.0, m=0.5, radius=0.03, axis=[0.6, 0.0, 0.8], c_phi=50.0)
-    load = Body(m=22.0, J=np.eye(3))
-
-    def equations(self):
-        yield connect(self.world.frame_b, self.rod.frame_a)
-        yield connect(self.rod.frame_b, self.load.frame_a)
+# A load at the end of a rod.
+Hung = in_a_row(
+    "Hung",
+    world=World(g=0.0),
+    rod=BushedRod(L=2.0, m=0.5, radius=0.03, axis=[0.6, 0.0, 0.8], c_phi=50.0),
+    load=Body(m=22.0, J=np.eye(3)),
+)
 
 
 def test_a_rod_gives_way_along_itself_by_both_joints_and_its_tube():

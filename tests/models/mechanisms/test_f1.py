@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from gantrytau import Dae, Fixed, ModelError, Start, simulate, translate
 from gantrytau.mechanics.translational import LinearFriction
-from gantrytau_models import F1GantryTau, GantryTau, prototypes
+from gantrytau_models import F1GantryTau, prototypes
 from tests.families import first_of
 from tests.references import f1
 
@@ -242,32 +242,20 @@ def test_members_are_modified_by_name(robots):
 
 def test_other_records_are_refused():
     f1_robot: Any = F1GantryTau
-    three_links: Any = GantryTau
-    with pytest.raises(
-        ModelError, match=r"F1GantryTau: found Prototype\(name='L1'\), expected a record with turn"
-    ):
+    with pytest.raises(ModelError, match=r"F1GantryTau: found Prototype\(name='L1'\), expected a Rotating"):
         f1_robot(prototypes.L1)
-    with pytest.raises(
-        ModelError, match=r"GantryTau: found RotatingPrototype\(name='F1'\), expected a prototype"
-    ):
-        three_links(prototypes.F1)
     with pytest.raises(TypeError, match=r"F1GantryTau: found friction='viscous', expected a class"):
         f1_robot(prototypes.F1, friction="viscous")
 
 
 @pytest.mark.filterwarnings("ignore::gantrytau_models.prototypes.DoubtfulPrototype")
 def test_turntables_that_are_not_rigid_are_refused():
-    with pytest.raises(
-        ModelError,
-        match=r"F1_printed\.arms\[1\]\.turntables\[0\]\.orientation of length 0\.97751.*take prototypes\.F1",
-    ):
+    with pytest.raises(ModelError, match=r"F1_printed\.arms\[1\]\.turntables\[0\]\.orientation of length"):
         F1GantryTau(prototypes.F1_printed)
 
 
 def test_another_structure_is_refused():
     one, two, three = prototypes.F1.arms
     fewer = dataclasses.replace(three, turntables=three.turntables[:1])
-    with pytest.raises(
-        ModelError, match=r"\(1, 3\)\) on its arms, expected \(\(0, 1\), \(1, 2\), \(2, 3\)\)"
-    ):
+    with pytest.raises(ModelError, match=r"\(1, 3\)\) on its arms, expected \(\(0, 1\), \(1, 2\), \(2"):
         F1GantryTau(dataclasses.replace(prototypes.F1, arms=(one, two, fewer)))

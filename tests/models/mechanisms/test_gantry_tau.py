@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, translate
+from gantrytau import translate
 from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.mechanics.translational import LinearFriction, TanhFriction
 from gantrytau_models import prototypes
@@ -373,9 +373,7 @@ def test_all_forces_given_along_a_line_are_too_many():
 
 
 def test_tool_out_of_reach_names_the_rods_and_their_residuals(gt_a):
-    with pytest.raises(
-        InitializationError, match=r"arms\[\d\]\.link \(SphericalSpherical\), equation 1.*off by"
-    ):
+    with pytest.raises(InitializationError, match=r"arms\[\d\]\.link \(SphericalSpherical\)"):
         gt_a.evaluate({"tool.r": [0.85, 9.0, -0.63]})
 
 
@@ -389,8 +387,6 @@ def test_rods_that_cannot_meet_are_named_when_translated():
 
 
 def test_what_is_not_a_prototype_is_refused():
-    with pytest.raises(
-        (TypeError, ModelError),
-        match=r"found 'L1', expected a prototype record such as prototypes.L1, of `from gantrytau_models import",
-    ):
-        GantryTau("L1")  # pyright: ignore[reportArgumentType]
+    for wrong, words in (("L1", "'L1'"), (prototypes.F1, r"RotatingPrototype\(name='F1'\)")):
+        with pytest.raises(TypeError, match=f"GantryTau: found {words}"):
+            GantryTau(wrong)  # pyright: ignore[reportArgumentType]

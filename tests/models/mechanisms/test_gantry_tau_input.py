@@ -14,9 +14,7 @@ def test_a_start_pose_is_held_and_the_carts_are_behind_the_tool():
 
 
 def test_a_negative_mass_is_refused():
-    with pytest.raises(
-        ModelError, match=r"plate_mass: value is -1, expected at least 0 \(mass of plate and tool\)"
-    ):
+    with pytest.raises(ModelError, match=r"plate_mass: value is -1"):
         translate(GantryTau(prototypes.L1, plate_mass=-1.0))
 
 

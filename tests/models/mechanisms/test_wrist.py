@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Dae, Model, ModelError, connect, simulate, translate
+from gantrytau import Dae, ModelError, simulate, translate
 from gantrytau.mechanics.multibody import FixedRotation, World
 from gantrytau_models import (
     F1WithWrist,
@@ -16,6 +16,7 @@ from gantrytau_models import (
     WithWrist,
     prototypes,
 )
+from tests.mechanisms.rows import in_a_row
 from tests.references import f1, six_link
 from tests.references.rotations import turn
 
@@ -144,16 +145,10 @@ def test_what_holds_the_wrist_is_the_rate_of_its_momentum(robots, name):
         np.testing.assert_allclose(at["wrist.frame_a.t"], torque, atol=1e-7, rtol=0)
 
 
-class OnAWall(Model):
-    """The wrist alone, its mount turned by 0.5 rad about y."""
-
-    world = World()
-    wall = FixedRotation(n=[0.0, 1.0, 0.0], phi=0.5)
-    wrist = SerialWrist()
-
-    def equations(self):
-        yield connect(self.world.frame_b, self.wall.frame_a)
-        yield connect(self.wall.frame_b, self.wrist.frame_a)
+# The wrist alone, its mount turned by 0.5 rad about y.
+OnAWall = in_a_row(
+    "OnAWall", world=World(), wall=FixedRotation(n=[0.0, 1.0, 0.0], phi=0.5), wrist=SerialWrist()
+)
 
 
 def test_holding_torques_are_those_of_the_weights():
@@ -181,9 +176,7 @@ def test_wrist_is_modified_by_name():
 
 
 def test_wrong_mounts_are_refused():
-    with pytest.raises(
-        ModelError, match=r"Mine: found WithWrist behind SixLinkGantryTau.*Mine\(WithWrist, Six"
-    ):
+    with pytest.raises(ModelError, match=r"Mine: found WithWrist behind SixLinkGantryTau.*Mine\(WithWrist"):
         type("Mine", (SixLinkGantryTau, WithWrist), {})
     pointlike: Any = type("Mine", (WithWrist, GantryTau), {})
     with pytest.raises(

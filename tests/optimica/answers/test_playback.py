@@ -313,9 +313,7 @@ class Tamed(Optimization):
 
 
 def test_a_motion_that_cannot_be_integrated_is_no_solution():
-    with pytest.raises(
-        SolveError, match="no motion: played back, it cannot be integrated beyond t = "
-    ) as caught:
+    with pytest.raises(SolveError, match="no motion: played back, it cannot be integrated beyond") as caught:
         optimize(Tamed, elements=1)
     assert not caught.value.optimum.playback.complete
 

@@ -284,12 +284,3 @@ def test_what_is_no_record_is_refused(record, tmp_path):
         with pytest.raises(ModelError, match="expected a record: what run_record returns"):
             call()
     assert list(tmp_path.iterdir()) == []
-
-
-def test_what_is_no_optimum_or_no_place_is_refused():
-    with pytest.raises(ModelError, match="run_record: found None, expected what optimize returned"):
-        run_record(None)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(
-        ModelError, match=r"write_record: found path=3, expected a folder or the name of a \.json"
-    ):
-        write_record(solved(), 3)  # pyright: ignore[reportArgumentType]

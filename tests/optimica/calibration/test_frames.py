@@ -109,9 +109,3 @@ def test_a_verdict_says_what_it_means_for_the_base():
     assert base.endswith("Poses were measured in the base of the robot: its coordinates are as good as this.")
     assert "This is good up to a frame: R and t follow from nominal values, so that in coordinates" in there
     assert "mm, as before, where these are 10 mm off; measure in the base of the robot" in there
-
-
-def test_there_are_two_frames():
-    robot, q, r, _ = l1()
-    with pytest.raises(ModelError, match="found frame='world', expected 'fitted' or 'base'"):
-        calibrate(robot, Measurements(q, r), frame="world")  # pyright: ignore[reportArgumentType]

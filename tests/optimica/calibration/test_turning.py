@@ -97,7 +97,7 @@ def test_a_prior_by_the_last_part_of_its_name(data):
     assert max(d for name, d in found.deviations.items() if "plate_offset" in name) < 1.2e-4
     with pytest.raises(ModelError, match="not identified"):
         calibrate(nominal(), data[1], prior={"plate_ofset": 1e-4})
-    with pytest.raises(ModelError, match="expected one above 0"):
+    with pytest.raises(ModelError, match="a number above 0"):
         calibrate(nominal(), data[1], prior={"plate_offset": -1e-4})
     name, value = "arms[0].links[0].length", float(TRUTH.arms[0].links[0].length) + 1e-3
     held = calibrate(nominal(), data[1], prior={name: (value, 1e-9)})  # a pair: about a value of its own

@@ -20,6 +20,10 @@ def changed(**members):
     return type("Wrong", (ThereAndBack,), members)
 
 
+def having(constraint):
+    return changed(constraints=lambda self: [constraint(self)])
+
+
 class Nested(First):
     """A phase within a phase."""
 
@@ -59,56 +63,20 @@ NO_PHASE: Any = 3
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
-        (
-            changed(out=Nested()),
-            "Wrong: the phase out.inner lies inside of out, expected phases as components",
-        ),
-        (
-            changed(held=Held()),
-            "Wrong: the phase held.inner lies inside of held, expected phases as components",
-        ),
+        (changed(out=Nested()), "Wrong: the phase out.inner lies inside of out, expected phases as"),
+        (changed(held=Held()), "Wrong: the phase held.inner lies inside of held, expected phases as"),
         (Outside, "Outside: load belongs to no phase, expected variables in phases only; declare it in one"),
         (Chosen, "Chosen: hand belongs to no phase"),
-        (
-            changed(integrand=lambda self: self.out.mass.u**2),
-            "Wrong.integrand: found an integrand beside phases, expected none; write it in the phases",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.y"])]),
-            "back.mass.y",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump=["mass.u"])]),
-            "Wrong: link, jump: back.mass.u is no state of the phase, expected one of back.mass.x, back.mass.v",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, self.back, jump="mass.v")]),
-            "link: found jump='mass.v', expected a list of names; write ['mass.v']",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out.mass, self.back)]),
-            "expected two phases: components that are Optimizations",
-        ),
-        (
-            changed(constraints=lambda self: [link(self.out, NO_PHASE)]),
-            "link: found 3, expected two phases",
-        ),
-        (
-            changed(constraints=lambda self: [self.out.mass.x <= self.back.mass.x]),
-            "joins signals of several phases over their whole paths, expected values at one time",
-        ),
-        (
-            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.x) == 0]),
-            "joins out and back, expected variables of one phase",
-        ),
-        (
-            changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]),
-            "link(out, back) finds no out.mass.h, expected the same variables in both phases",
-        ),
-        (
-            changed(constraints=lambda self: [final(self.out.mass.x + self.back.mass.z) == 0]),
-            "Mass has no 'z'",
-        ),
+        (changed(integrand=lambda self: self.out.mass.u**2), "Wrong.integrand: found an integrand beside"),
+        (having(lambda p: link(p.out, p.back, jump=["mass.y"])), "back.mass.y"),
+        (having(lambda p: link(p.out, p.back, jump=["mass.u"])), "Wrong: link, jump: back.mass.u is no"),
+        (having(lambda p: link(p.out, p.back, jump="mass.v")), "link: found jump='mass.v', expected a list"),
+        (having(lambda p: link(p.out.mass, p.back)), "found first="),
+        (having(lambda p: link(p.out, NO_PHASE)), "link: found second=3, expected a phase"),
+        (having(lambda p: p.out.mass.x <= p.back.mass.x), "joins signals of"),
+        (having(lambda p: final(p.out.mass.x + p.back.mass.x) == 0), "joins out and back, expected"),
+        (changed(back=Other(), constraints=lambda self: [link(self.out, self.back)]), "link(out, back)"),
+        (having(lambda p: final(p.out.mass.x + p.back.mass.z) == 0), "Mass has no 'z'"),
     ],
 )
 def test_what_cannot_be_a_phase(problem, words):
@@ -116,12 +84,12 @@ def test_what_cannot_be_a_phase(problem, words):
 
 
 def test_a_link_of_the_problem_itself():
-    assert "link" in message(changed(constraints=lambda self: [link(self, self.back)]))
+    assert "link" in message(having(lambda p: link(p, p.back)))
 
 
 def test_a_link_of_a_phase_of_another_problem():
     other = ThereAndBack()
-    assert "link" in message(changed(constraints=lambda self: [link(self.out, other.back)]))
+    assert "link" in message(having(lambda p: link(p.out, other.back)))
 
 
 def test_phases_whose_fixed_times_do_not_meet():
@@ -135,7 +103,5 @@ def test_phases_whose_fixed_times_do_not_meet():
         def constraints(self):
             yield link(self.first, self.second)
 
-    with pytest.raises(
-        ModelError, match=r"first ends at 1 s, where second begins at 0 s.* start_time = 1 in second"
-    ):
+    with pytest.raises(ModelError, match=r"first ends at 1 s, where second begins at 0 s.* start_time = 1"):
         optimize(Twice)

@@ -63,7 +63,7 @@ class Mixed(Fading):
         (Power, r"only k \* V\^2 is determined"),
         (Sum, r"only k \+ V is determined"),
         (Difference, "only k - V is determined"),
-        (Mixed, "changing k by .* V by .* changes nothing"),
+        (Mixed, r"only k \+ [\d.]+ V \(to first order\) is determined"),
     ],
 )
 def test_parameters_that_only_occur_together(model, words):
@@ -74,7 +74,7 @@ def test_parameters_that_only_occur_together(model, words):
 
 
 def test_a_parameter_without_influence():
-    with pytest.raises(SolveError, match=r"idle has no influence on what was measured\. Leave it out"):
+    with pytest.raises(SolveError, match=r"nothing that was measured depends on idle\. Leave it out"):
         estimate(Fading, {"k": Free(1.0), "idle": Free(1.0)}, DATA)
 
 
@@ -90,7 +90,7 @@ def test_a_parameter_at_its_limit_is_named_and_left_out():
         fit.covariance(["z"])
     with pytest.raises(ModelError, match=r"write \['k'\]"):
         fit.covariance("k")
-    with pytest.raises(ModelError, match="confidence=95, expected a number between 0 and 1"):
+    with pytest.raises(ModelError, match="confidence=95, expected a number above 0 and below 1"):
         fit.intervals(95)  # pyright: ignore[reportArgumentType]
 
 
@@ -109,11 +109,7 @@ def test_deviations_that_are_too_small_are_told():
 @pytest.mark.parametrize(
     ("experiment", "parameters", "words"),
     [
-        (
-            Experiment({"y": ([1.0], [1.0])}, start={"y": Free(1.0)}),
-            {"k": 1.0},
-            "1 measured values for 2 numbers",
-        ),
+        (Experiment({"y": ([1.0], [1.0])}, start={"y": Free(1.0)}), {"k": 1.0}, "1 measured values for 2"),
         (Experiment({"y": ([1.0], [1.0])}), {"k": 1.0}, "expected more, to tell the noise"),
         (DATA, {}, "nothing to estimate"),
         (DATA, {"q": 1.0}, "Decay has no 'q'"),
@@ -127,22 +123,14 @@ def test_deviations_that_are_too_small_are_told():
         (Experiment({"y[3]": (TIMES, FADING)}), {"k": 1.0}, r"no element \[3\] of y"),
         (Experiment({"y": (TIMES, np.c_[FADING, FADING])}), {"k": 1.0}, "samples of 2 columns, expected 1"),
         (Experiment({"y": (TIMES, FADING)}, stop=2.0), {"k": 1.0}, "4 samples lie outside of the horizon"),
-        (
-            Experiment({"y": (TIMES, FADING)}, start={"k": 1.0}),
-            {"k": 1.0},
-            "k is a parameter, expected it in par",
-        ),
+        (Experiment({"y": (TIMES, FADING)}, start={"k": 1.0}), {"k": 1.0}, "k is a parameter, expected it"),
         (Experiment({"y": (TIMES, FADING)}, inputs={"u": 1.0}), {"k": 1.0}, "inputs: Decay has no 'u'"),
         (Experiment({"y": FADING}), {"k": 1.0}, "without times, expected Samples"),
         (Experiment({"y": (TIMES, FADING)}, parameters={"k": 1.0}), {"k": 1.0}, "has its own k"),
         ([], {"k": 1.0}, "expected one Experiment or a list"),
         ([Experiment({"y": (TIMES, FADING)}, name="a b")], {"k": 1.0}, "expected a word of letters"),
         ([Experiment({"y": (TIMES, FADING)}, name="a")] * 2, {"k": 1.0}, "two experiments are called a"),
-        (
-            [DATA, Experiment({"y": Samples(TIMES, FADING, deviation=0.1)})],
-            {"k": 1.0},
-            "has none, expected all or none",
-        ),
+        ([DATA, Experiment({"y": Samples(TIMES, FADING, deviation=0.1)})], {"k": 1.0}, "has none, expected"),
     ],
 )
 def test_what_does_not_fit(experiment, parameters, words):
@@ -151,9 +139,7 @@ def test_what_does_not_fit(experiment, parameters, words):
 
 
 def test_starts_and_inputs_that_are_missing():
-    with pytest.raises(
-        ModelError, match=r"1 initial values are neither given nor estimated \(experiment_1: y\)"
-    ):
+    with pytest.raises(ModelError, match=r"1 initial values are neither given nor estimated"):
         estimate(Trend, {"slope": 1.0}, DATA)
     levels = (TIMES, 0.06 + 0.001 * FADING)
     with pytest.raises(ModelError, match="the input u2 of experiment_1 is not known"):
@@ -176,8 +162,6 @@ def test_times_that_are_no_times():
             Experiment({"y": (times, [1.0, 2.0, 3.0])})
     with pytest.raises(ModelError, match="expected the first to be the smaller"):
         Experiment({"y": (TIMES, FADING)}, begin=5.0)
-    with pytest.raises(ModelError, match="stop='soon', expected a time"):
-        Experiment({"y": (TIMES, FADING)}, stop="soon")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ModelError, match="found nothing measured"):
         Experiment({})
     with pytest.raises(ModelError, match=r"measured y: found 3\.0"):
@@ -191,7 +175,5 @@ def test_times_that_are_no_times():
 def test_calls_that_make_no_sense():
     with pytest.raises(ModelError, match="expected a Model"):
         estimate("Decay", {"k": 1.0}, DATA)  # pyright: ignore[reportArgumentType]
-    with pytest.raises(ModelError, match="expected 'squares' or 'robust'"):
-        estimate(Decay, {"k": 1.0}, DATA, loss="huber")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ModelError, match="input concentration of experiment_1 is not known"):
         estimate(Enzyme, {"top": 200.0}, Experiment({"rate": [1.0, 2.0]}))

@@ -22,7 +22,7 @@ class LeastFuel(FastestMass):
 def test_kinks_are_named_where_they_stand():
     with pytest.raises(SolveError) as caught:
         optimize(LeastFuel, max_iterations=12)
-    assert "Not smooth, so that slopes jump:" in str(caught.value)
+    assert "Not smooth, so that derivatives jump:" in str(caught.value)
     assert "`fabs(mass.u)` in the integrand" in str(caught.value)
     assert "fmax(final(mass.v)" in str(caught.value)
     assert "Write fabs(x) as p + n with inputs p, n >= 0" in str(caught.value)

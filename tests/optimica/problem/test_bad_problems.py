@@ -33,52 +33,28 @@ def message(wrong, **policy) -> str:
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (
-            lambda p: [True],
-            "Problem, constraint 5: found True, expected a constraint; both sides were compared",
-        ),
+        (lambda p: [True], "Problem, constraint 5: found True, expected a constraint; both sides were"),
         (lambda p: [None], "Problem, constraint 5: found None, expected a constraint"),
         (lambda p: [[p.mass.x, p.mass.v]], "joined by casadi.vertcat(*list)"),
         (lambda p: [p.mass], "expected a constraint; write `a == b`"),
         (lambda p: [p.mass.x], "found `mass.x`, expected `a == b`, `a <= b` or between(a, x, b)"),
         (lambda p: [p.mass.x != 1], "found `(mass.x!=1)`, expected"),
-        (
-            lambda p: [0 <= p.mass.x <= 1],
-            "Problem, constraint 5: Cannot compute the truth value of a CasADi SXElem symbolic expression; Python's if",
-        ),
+        (lambda p: [0 <= p.mass.x <= 1], "Problem, constraint 5: Cannot compute the truth value of a"),
         (lambda p: [p.mass.speed <= 1], "Problem, constraint 5: Mass has no 'speed'"),
-        (
-            lambda p: [between(2, p.mass.v, 1)],
-            "`2 <= mass.v <= 1` has the limits 2 and 1, expected a lower one",
-        ),
+        (lambda p: [between(2, p.mass.v, 1)], "`2 <= mass.v <= 1` has the limits 2 and 1, expected a lower"),
         (lambda p: [p.mass.v <= math.nan], "has a limit that is not a number"),
         (lambda p: [between([1, 2], p.mass.x, 3)], "a limit has shape (2, 1), the expression (1, 1)"),
-        (
-            lambda p: [p.mass.v <= -1, p.mass.v >= 1],
-            "`mass.v >= 1` and `mass.v <= -1` contradict each other, mass.v cannot be at least 1 and at most -1",
-        ),
+        (lambda p: [p.mass.v <= -1, p.mass.v >= 1], "`mass.v >= 1` and `mass.v <= -1` contradict each"),
         (lambda p: [p.mass.u >= 3], "`mass.u >= 3` and `limits of mass.u` contradict each other"),
-        (
-            lambda p: [initial(p.mass.x) == 1],
-            "`initial(mass.x) == 1` contradicts other conditions at the same time",
-        ),
+        (lambda p: [initial(p.mass.x) == 1], "`initial(mass.x) == 1` contradicts other conditions at the"),
         (lambda p: [final(p.mass.x) == final(p.mass.v)], "constraint 5: units disagree"),
         (lambda p: [p.mass.x <= p.mass.v], "the left side is in 'm', the right side in 'm/s'"),
         (lambda p: [p.mass.x + p.mass.v <= 1], "`mass.x` is in 'm', `mass.v` in 'm/s'"),
-        (
-            lambda p: [at(p.mass.x, p.mass.v) == 0],
-            "at(mass.x, ...) depends on mass.x, expected a time of numbers",
-        ),
-        (
-            lambda p: [at(2 * p.final_time, p.mass.x) == 0],
-            "of its length; choose a time inside of it",
-        ),
+        (lambda p: [at(p.mass.x, p.mass.v) == 0], "at(mass.x, ...) depends on mass.x, expected a time of"),
+        (lambda p: [at(2 * p.final_time, p.mass.x) == 0], "of its length; choose a time inside of it"),
         (lambda p: [initial(final(p.mass.x)) == 0], "found final(mass.x), which has its time already"),
         (lambda p: [final("x") == 0], "constraint 5: final: found str, expected a variable"),
-        (
-            lambda p: [p.mass.x <= final(p.mass.x)],
-            "mixes a signal over the whole path with its value at one time",
-        ),
+        (lambda p: [p.mass.x <= final(p.mass.x)], "mixes a signal over the whole path with its value at"),
         (lambda p: [p.mass.x == 1 - p.mass.x, p.mass.u**2 == 1], "conditions for"),
     ],
 )
@@ -89,20 +65,14 @@ def test_a_constraint_that_cannot_be(body, words):
 @pytest.mark.parametrize(
     ("members", "words"),
     [
-        (
-            dict(objective=lambda p: p.mass.x),
-            "depends on mass.x, which changes over time; say at which time with",
-        ),
+        (dict(objective=lambda p: p.mass.x), "depends on mass.x, which changes over time; say at which"),
         (dict(objective=lambda p: None), ".objective: found None, expected a number or an expression"),
         (dict(objective=lambda p: "time"), ".objective: found 'time', expected"),
         (dict(objective=lambda p: [p.final_time, 1]), ".objective: found ["),
         (dict(objective=lambda p: p.mass.energy), ".objective: Mass has no 'energy'"),
         (dict(integrand=lambda p: 1 / 0), ".integrand: division by zero"),
         (dict(constraints=lambda p: None), ".constraints: found None, expected constraints; give each out"),
-        (
-            dict(constraint=lambda p: []),
-            "nothing asks for a method of this name; did you mean 'constraints'?",
-        ),
+        (dict(constraint=lambda p: []), "nothing asks for a method of this name; did you mean"),
         (dict(final_time="soon"), ".final_time: found 'soon', expected a number in s"),
         (dict(final_time=[1.0, 2.0]), ".final_time: found"),
         (dict(final_time=0.0), "start_time 0 s and final_time 0 s, expected the first to be the smaller"),
@@ -129,7 +99,7 @@ def test_a_member_that_cannot_be(members: dict[str, Any], words: str):
         ({"final_time": math.nan}, "guess final_time: found nan, expected a finite number"),
         ({"final_time": "long"}, "guess final_time: found 'long', expected a number"),
         ({"final_time": -3.0}, "expected the first to be the smaller"),
-        (3.0, "guess=3.0: expected {name:"),
+        (3.0, "found guess=3.0, expected {name:"),
     ],
 )
 def test_a_guess_that_cannot_be(guess, words):

@@ -296,7 +296,7 @@ def test_one_program_solved_for_many_parameters():
     assert prepared.solve().final_time == pytest.approx(2.0, abs=1e-6)
     with pytest.raises(ModelError, match=r"mass.x is no parameter"):
         prepare(To, parameters=["mass.x"])
-    with pytest.raises(ModelError, match=r"target: was not named in prepare"):
+    with pytest.raises(ModelError, match=r"found parameters=\['target'\], expected some of"):
         prepare(To, parameters=["strength"]).solve({"target": 1.0})
     with pytest.raises(ModelError, match=r"target: found nan, expected 1 finite number"):
         prepared.solve({"target": np.nan})

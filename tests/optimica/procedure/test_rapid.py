@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
 from gantrytau_optimica import Measurements, load_plan, plan_calibration
 from tests.optimica.procedure import cells
+from tests.optimica.refusals import refused
 
 DONE = 'TPReadFK keyCalibration,"Measure {}, {} of {}",stEmpty,stEmpty,stEmpty,stEmpty,"Done";'
 TARGET = re.compile(r"CONST jointtarget (\w+):=\[\[([^\]]*)\],\[([^\]]*)\]\];")
@@ -132,22 +132,19 @@ def test_lines_and_names_are_those_that_rapid_takes(plan):
 
 
 @pytest.mark.parametrize(
-    ("policy", "message"),
+    "wrong",
     [
-        (
-            dict(name="1st"),
-            r"program\.name: found '1st', expected a name of RAPID: a letter, .* 32 characters",
-        ),
-        (dict(name="B" * 33), r"expected a name of RAPID"),
-        (dict(name="Module"), r"no reserved word"),
-        (dict(trigger="do measure"), r"program\.trigger: found 'do measure'"),
-        (dict(tool=""), r"program\.tool: found ''"),
-        (dict(carts="axes"), r"program\.carts: found 'axes', expected 'robax' or 'extax'"),
-        (dict(speed=0.0), r"program\.speed: found 0.0, expected a number in m/s above 0"),
-        (dict(settle=-1.0), r"program\.settle: found -1.0, expected a number in s, not negative"),
-        (dict(measure=float("nan")), r"program\.measure: found nan"),
+        dict(name="1st"),
+        dict(name="B" * 33),
+        dict(name="Module"),
+        dict(trigger="do measure"),
+        dict(tool=""),
+        dict(carts="axes"),
+        dict(speed=0.0),
+        dict(settle=-1.0),
+        dict(measure=float("nan")),
     ],
 )
-def test_what_rapid_does_not_take_is_refused(plan, policy, message):
-    with pytest.raises(ModelError, match=message):
-        plan.program(**policy)
+def test_what_rapid_does_not_take_is_refused(plan, wrong):
+    with refused(*wrong):
+        plan.program(**wrong)

@@ -98,7 +98,7 @@ def test_a_hook_that_raises_is_a_ctrl_c():
 
 @pytest.mark.parametrize(
     ("module", "name"),
-    [(refinement_module, "transcribe"), (refinement_module, "warm_start"), (replay_module, "_system")],
+    [(refinement_module, "transcribed_again"), (refinement_module, "warm_start"), (replay_module, "_system")],
 )
 def test_wherever_it_comes_a_solution_is_kept(monkeypatch, module, name):
     def press(*arguments):
@@ -323,9 +323,7 @@ def test_time_ends_while_it_is_asked_whether_there_is_a_minimum(monkeypatch):
     monkeypatch.setattr(
         sys.modules["gantrytau_optimica.prepared"], "places_aside", lambda *a, **k: time.sleep(60)
     )
-    with pytest.raises(
-        SolveError, match="time limit reached; found until then: a solution on 20 elements"
-    ) as caught:
+    with pytest.raises(SolveError, match="time limit reached; found until then: a solution on 20") as caught:
         optimize(CatalystMixing, elements=20, max_time=6.0)
     assert caught.value.optimum.success
     assert not caught.value.interrupted

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, cos, der, sin, time
+from gantrytau import Fixed, Input, Model, Parameter, Real, between, cos, der, sin, time
 from gantrytau.commands.demo.motion_problems import LIMIT, OnLine
 from gantrytau_optimica import Free, Optimization, final, optimize, prepare
 from tests.optimica.control.test_controls import Effort, best_pieces
@@ -364,14 +364,3 @@ def test_a_prepared_problem_refines_every_answer():
     prepared = prepare(Target, parameters=["target"], elements=7, refine=ACCURACY)
     for target in (1.0, 4.0, 2.0):
         assert held(prepared.solve({"target": target})).final_time == near(2 * np.sqrt(target))
-
-
-@pytest.mark.parametrize("refine", [0, 0.0, 1, 1.0, 1e-12, -1e-6, "fine", True, np.nan, [1e-6]])
-def test_an_accuracy_that_cannot_be(refine):
-    with pytest.raises(ModelError, match="expected a relative accuracy from 1e-9 to below 1, as 1e-6"):
-        optimize(FastestMass, refine=refine)
-
-
-def test_shooting_is_not_refined():
-    with pytest.raises(ModelError, match="refine and scheme='shooting' do not go together"):
-        optimize(FastestMass, refine=1e-6, scheme="shooting")

@@ -300,7 +300,5 @@ def test_a_limit_of_a_free_number_that_is_a_parameter(limit):
     if limit == "constraint":
         assert sensitivities(optimum, ["top"]).objective["top"] == pytest.approx(-1.0, rel=1e-6)
         return
-    with pytest.raises(
-        ModelError, match=r"a limit of q follows from top, .*write the limit of q in `constraints`"
-    ):
+    with pytest.raises(ModelError, match=r"a limit of q follows from top, .*write the limit of q in"):
         sensitivities(optimum, ["top"])

@@ -72,34 +72,6 @@ def test_free_lengths_of_an_integral():
     np.testing.assert_allclose(found.breaks, [0.25, 0.5, 0.75], atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("elements", "words"),
-    [
-        ([], "expected a whole number of at least 1, or the lengths of the elements, all above 0"),
-        ([1, 0], "or the lengths of the elements, all above 0"),
-        ([1, -2], "all above 0"),
-        ([1, np.nan], "all above 0"),
-        ([[1, 2]], "all above 0"),
-        (["long"], "all above 0"),
-        ("5", "elements='5'"),
-        (None, "elements=None: expected a whole number of at least 1, or a list of lengths"),
-        (True, "elements=True"),
-    ],
-)
-def test_elements_that_cannot_be(elements, words):
-    with pytest.raises(ModelError) as caught:
-        optimize(FastestMass, elements=elements)
-    assert words in str(caught.value)
-
-
-def test_lengths_that_cannot_be():
-    wrong: Any = "equal"
-    with pytest.raises(ModelError, match="lengths='equal': expected 'given' or 'free'"):
-        optimize(FastestMass, lengths=wrong)
-    with pytest.raises(ModelError, match="lengths='free' and scheme='shooting' do not go together"):
-        optimize(FastestMass, lengths="free", scheme="shooting")
-
-
 class Via(FastestMass):
     """Half of the way at 1.3 s, which is later than the fastest: 1 s."""
 

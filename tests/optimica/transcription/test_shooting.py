@@ -163,10 +163,7 @@ def test_parameters_may_change_between_solves():
     assert other < one
 
 
-def test_free_lengths_and_moving_times_are_refused():
-    with pytest.raises(ModelError, match=r"lengths='free' and scheme='shooting' do not go together; use"):
-        shoot(FastestMass, lengths="free")
-
+def test_moving_times_are_refused():
     class Moving(FastestMass):
         def constraints(self):
             yield from super().constraints()

@@ -292,9 +292,7 @@ def test_a_start_that_is_delayed_is_consistent():
             yield self.y == self.x + 2 * delay(self.y, 1.0)
             yield der(self.x) == 0
 
-    with pytest.raises(
-        InitializationError, match=r"Growing: found no value for delay\(y, 1\) that is what is delayed"
-    ):
+    with pytest.raises(InitializationError, match=r"Growing: found no value for delay\(y"):
         simulate(Growing(), stop=1.0)
 
 
@@ -315,9 +313,7 @@ def test_other_faults_are_refused_by_name():
             yield self.y == delay(self.u, 1 + self.v)
             yield der(self.v) == self.y
 
-    with pytest.raises(
-        ModelError, match=r"found v in the time of a delay, expected a number or an expression of param"
-    ):
+    with pytest.raises(ModelError, match=r"found v in the time of a delay"):
         simulate(OfVariable(), stop=1.0)
 
     class Differentiated(Late):
@@ -329,9 +325,7 @@ def test_other_faults_are_refused_by_name():
         simulate(Differentiated(), stop=1.0)
     with pytest.raises(ModelError, match=r"expected a time above zero, in s, in delay\(x, T\)"):
         simulate(Oscillator(T=-1.0), stop=1.0)
-    with pytest.raises(
-        ModelError, match=r"delay\(x, T\): 1e-09 s is less than a \d+th of the 10 s of the simulation"
-    ):
+    with pytest.raises(ModelError, match=r"delay\(x, T\): 1e-09 s is less than a \d+th of the 10 s of the"):
         simulate(Oscillator(T=1e-9), stop=10.0)
     with pytest.raises(ModelError, match=r"delay\(\) was called outside of equations"):
         delay(ca.SX.sym("x"), 1.0)

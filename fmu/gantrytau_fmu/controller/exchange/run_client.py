@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import check_words, number
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau_fmu.controller.channels import Declaration
 from gantrytau_fmu.controller.clients import Client, Sample
 from gantrytau_fmu.controller.exchange.client_socket import AGAIN, ALIVE, ClientSocket, opened
@@ -43,12 +44,13 @@ def run_client(
     duration: s after which it leaves; patience: s for which the controller may keep silent, at first and later on. Raises
     ModelError where nobody is there, and where the controller refuses this client, in its words.
     """
-    if transport not in ("udp", "tcp"):
-        raise ModelError(f"run_client: found transport={transport!r}, expected 'udp' or 'tcp'")
+    check_words(run_client, {"transport": transport})
+    number("run_client", "patience", patience, above=0.0, unit="s")
+    if duration is not None:
+        number("run_client", "duration", duration, least=0.0, unit="s")
     if not (isinstance(address, Sequence) and len(address) == 2 and isinstance(address[1], int)):
-        raise ModelError(
-            f"run_client: found address={address!r}, expected (host, port), as ('127.0.0.1', 5000)"
-        )
+        expected = "expected (host, port), as ('127.0.0.1', 5000)"
+        raise ModelError(expected, place="run_client", found=Given("address", address))
     end = None if duration is None else time.monotonic() + duration
     said, place = Introduction(client.name, token, client.sends), f"{address[0]}:{address[1]}"
     own, found = opened(address, transport, patience), Attended()

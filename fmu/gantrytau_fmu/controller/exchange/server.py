@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import number, whole
 from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.controller.board import STATES
 from gantrytau_fmu.controller.channels import Channel, Declaration
@@ -77,6 +78,7 @@ class Server:
         host: str = "127.0.0.1",
         token: str | None = None,
     ):
+        whole("serve", "port", port, least=0, most=65_535)
         self.controller, self.dropped, self.refused = controller, 0, 0
         self.places = {place.name: place for place in places if isinstance(place, RemoteClient)}
         self._beyond = host not in LOOPBACK
@@ -164,10 +166,7 @@ class Server:
                 raise ModelError(
                     f"wait: there is no place for '{name}', expected one of {', '.join(self.places) or 'none'}"
                 )
-        if isinstance(timeout, bool) or not isinstance(timeout, (int, float)) or not timeout >= 0:
-            raise ModelError(
-                f"wait: found timeout={timeout!r}, expected a time in s, 0 or more", argument="timeout"
-            )
+        number("wait", "timeout", timeout, least=0.0, unit="s")
         pause, end = threading.Event(), time.monotonic() + timeout
         while missing := [name for name in wanted if not self.places[name].connected]:
             if time.monotonic() > end:
@@ -351,10 +350,6 @@ class Server:
 
 def _sockets(host: str, port: int) -> tuple[socket.socket, socket.socket]:
     """A socket for datagrams and one that listens, on one port."""
-    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port < 2**16:
-        raise ModelError(
-            f"serve: found port={port!r}, expected a whole number from 0 to 65535", argument="port"
-        )
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     datagrams = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

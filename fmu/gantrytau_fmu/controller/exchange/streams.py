@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gantrytau.border.checks import check_words, whole
 from gantrytau.border.columns import TIMES, Columns
 from gantrytau.border.refusal import ModelError
 from gantrytau.inputs.samples import Samples
@@ -54,6 +55,7 @@ class FileStream(_Answering):
     """See `stream_file`."""
 
     def __init__(self, path: Path, name: str, at_end: Literal["hold", "stop"]):
+        check_words(FileStream, {"at_end": at_end}, "stream_file")
         self.path, self.at_end, self.row = path, at_end, -1
         table, self.columns = _read(path)
         units = [table.unit(name) or "1" for name in self.columns]
@@ -150,10 +152,7 @@ def stream_file(
     zeros are sent. A sample that is lost on its way shifts no row. at_end: "hold" goes on with the last row, "stop"
     sends nothing more; `.state` says where it is. Raises ModelError for files that are no table of numbers.
     """
-    if at_end not in ("hold", "stop"):
-        raise ModelError(
-            f"stream_file: found at_end={at_end!r}, expected 'hold' or 'stop'", argument="at_end"
-        )
+    check_words(stream_file, {"at_end": at_end})
     return FileStream(Path(path), name, at_end)
 
 
@@ -199,6 +198,7 @@ def haptic_client(
 
     hand(t, felt) -> force: what the hand does against the felt force; feels: name of the published force.
     """
+    whole("haptic_client", "size", size, least=1)
 
     def push(t: float, values: dict[str, Any]) -> Mapping[str, Any]:
         if feels not in values:

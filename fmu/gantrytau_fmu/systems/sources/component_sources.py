@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gantrytau import Dae, Model
 from gantrytau.border.refusal import ModelError
-from gantrytau_fmu.export import export_fmu
+from gantrytau_fmu.export import Build, export_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.isolation import Isolated
@@ -26,7 +26,9 @@ def describe_source(name: str, source: Source, folder: Path, tolerance: float | 
         return source.component(name)
     if isinstance(source, (Model, Dae)):
         file = folder.with_suffix(".fmu")
-        export_fmu(source, file, interfaces="co-simulation", sources=False, tolerance=tolerance or 1e-6)
+        export_fmu(
+            source, file, interfaces="co-simulation", tolerance=tolerance or 1e-6, build=Build(sources=False)
+        )
         words = source.name if isinstance(source, Dae) else type(source).__name__
         return read_component(name, words, unpack(file, folder))
     if isinstance(source, (str, os.PathLike)):

@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 from gantrytau.border.refusal import ModelError
 from gantrytau_fmu.reading.safe_xml import check_xml
-from gantrytau_fmu.reading.safety import unpack
+from gantrytau_fmu.reading.safety import extract, located
 from gantrytau_fmu.systems.component import Component
 from gantrytau_fmu.systems.connected_system import SystemConnection, locate
 
@@ -63,16 +63,20 @@ def read_ssp(path: str | os.PathLike[str], folder: Path) -> SystemStructure:
     """
     if Path(path).suffix.lower() == ".fmu":
         raise ModelError(f"{path} is one FMU, expected a system (.ssp) or {{name: FMU file}}")
-    unpack(path, folder, needs=STRUCTURE)
+    with located(path):
+        return structure_of(path, folder)
+
+
+def structure_of(path: str | os.PathLike[str], folder: Path) -> SystemStructure:
+    """As `read_ssp`, but its errors leave it to `located` to name the file."""
+    extract(path, folder, needs=STRUCTURE)
     text = (folder / STRUCTURE).read_bytes()
-    check_xml(text, f"{path}: {STRUCTURE}")
+    check_xml(text, STRUCTURE)
     root = ElementTree.fromstring(text)
     system = root.find(f"{SSD}System")
     if root.tag != f"{SSD}SystemStructureDescription" or system is None:
-        raise ModelError(
-            f"{path}: found <{root.tag}>, expected a SystemStructureDescription of SSP 1 with a System"
-        )
-    reader = _Reader(str(path), folder)
+        raise ModelError(f"found <{root.tag}>, expected a SystemStructureDescription of SSP 1 with a System")
+    reader = _Reader(folder)
     reader.system(system, "")
     experiment = root.find(f"{SSD}DefaultExperiment")
     attributes = experiment.attrib if experiment is not None else {}
@@ -95,10 +99,10 @@ def matching(components: Mapping[str, Component], start: Mapping[str, Any]) -> d
 
 
 class _Reader:
-    """What has been read of a structure; file: for messages."""
+    """What has been read of a structure."""
 
-    def __init__(self, file: str, folder: Path):
-        self.file, self.folder = file, folder
+    def __init__(self, folder: Path):
+        self.folder = folder
         self.components: dict[str, Path] = {}
         self.kinds: dict[Node, str] = {}
         self.systems: set[str] = set()
@@ -158,11 +162,11 @@ class _Reader:
         try:
             return float(text)
         except ValueError:
-            raise ModelError(f"{self.file}: {where}: found '{text}', expected a number") from None
+            raise ModelError(f"{where}: found '{text}', expected a number") from None
 
     def refuse(self, words: str) -> NoReturn:
         raise ModelError(
-            f"{self.file}: {words}, which is not supported; expected FMUs, systems, connections and values of "
+            f"{words}, which is not supported; expected FMUs, systems, connections and values of "
             "parameters, give the rest as arguments of cosimulate"
         )
 
@@ -177,9 +181,7 @@ class _Reader:
             self.refuse(f"component '{path}' has the source '{source}', which is no file of this archive")
         file = self.folder / parts
         if not file.is_file():
-            raise ModelError(
-                f"{self.file}: component '{path}' names {source}, expected a file of this archive"
-            )
+            raise ModelError(f"component '{path}' names {source}, expected a file of this archive")
         self.components[path] = file
         self._connectors(element, path)
         self._bindings(element, path)
@@ -205,7 +207,7 @@ class _Reader:
             start, end = end, start
         if end in self.wires:
             raise ModelError(
-                f"{self.file}: {'.'.join(end)} is driven by {'.'.join(self.wires[end].source)} and by "
+                f"{'.'.join(end)} is driven by {'.'.join(self.wires[end].source)} and by "
                 f"{'.'.join(start)}, expected one of them"
             )
         convert = element.get("suppressUnitConversion", "false") not in ("true", "1")
@@ -236,7 +238,7 @@ class _Reader:
         if ":" in source or parts.is_absolute() or ".." in parts.parts or not (self.folder / parts).is_file():
             self.refuse(f"{where} has the source '{source}', which is no file of this archive")
         text = (self.folder / parts).read_bytes()
-        check_xml(text, f"{self.file}: {source}")
+        check_xml(text, source)
         return ElementTree.fromstring(text)
 
     def _parameter(self, where: str, name: str, parameter: Any) -> None:

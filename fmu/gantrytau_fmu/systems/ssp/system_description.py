@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
 from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
@@ -16,7 +17,7 @@ from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, build_system, unconnected
-from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp
+from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp, structure_of
 
 
 @dataclass(frozen=True)
@@ -108,15 +109,16 @@ def check_system(
 
     run: also try each FMU, as `check_fmu` does. `FmuFinding.path` names the file in the archive.
     """
+    number("check_system", "timeout", timeout, above=0.0, unit="s")
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
         return errors_first(_found(Path(path), Path(folder), run, timeout))
 
 
 def _found(path: Path, folder: Path, run: bool, timeout: float) -> Iterator[FmuFinding]:
     try:
-        structure = read_ssp(path, folder / "system")
+        structure = structure_of(path, folder / "system")
     except ModelError as error:
-        yield FmuFinding("error", str(error).removeprefix(f"{path}: "), str(path))
+        yield FmuFinding("error", str(error), str(path))
         return
     whole = True
     for file in dict.fromkeys(structure.components.values()):

@@ -2,14 +2,14 @@
 
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
-from gantrytau.whole_files import replacing
+from gantrytau_fmu.building.archive import check_target, write_archive
 from gantrytau_fmu.reading.safety import unpack
 from gantrytau_fmu.systems.component import Component, Scalar, numeric, read_component
 from gantrytau_fmu.systems.connected_system import (
@@ -20,10 +20,10 @@ from gantrytau_fmu.systems.connected_system import (
     build_system,
     unit_of,
 )
+from gantrytau_fmu.systems.master import check_times
 from gantrytau_fmu.systems.ssp.read_ssp import FMU_TYPE, STEP, STRUCTURE
 
 SPACES = "http://ssp-standard.org/SSP1/SystemStructure"
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that zip knows: equal systems give equal files
 TYPES = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "text": "String"}
 
 
@@ -43,18 +43,13 @@ def write_ssp(
     an annotation. The file is complete when it appears. Raises ModelError for a system that does not fit, as
     `cosimulate`, for arrays of FMI 3, which SSP 1.0 cannot connect, and where the file cannot be written.
     """
+    begin, stop, step = (
+        number("write_ssp", name, value, unit="s")
+        for name, value in (("begin", begin), ("stop", stop), ("step", step))
+    )
+    check_times("write_ssp", begin, stop, step)
     path = Path(path)
-    if path.suffix.lower() != ".ssp":
-        raise ModelError(f"{path}: found the suffix '{path.suffix}', expected .ssp; call it {path.stem}.ssp")
-    if path.is_dir():
-        raise ModelError(
-            f"{path} is a folder, expected the name of a file; name one in it, as {path / 'system.ssp'}"
-        )
-    if not begin < stop or not 0 < step <= stop - begin:
-        raise ModelError(
-            f"{path}: found begin={begin}, stop={stop}, step={step}; expected 0 < step <= stop - begin; "
-            "choose such times, in s"
-        )
+    check_target(path, ".ssp")
     files = {name: Path(file) for name, file in components.items()}
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
         parts = {
@@ -66,15 +61,7 @@ def write_ssp(
     sources = _sources(files)
     members = {STRUCTURE: _structure(path.stem, system, sources, begin, stop, step).encode()}
     members |= {sources[name]: file.read_bytes() for name, file in files.items()}
-    try:
-        with replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in members.items():
-                entry = zipfile.ZipInfo(name, EPOCH)
-                entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-                archive.writestr(entry, content)
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be written ({error.strerror}); name another place") from error
-    return path
+    return write_archive(path, members, suffix=".ssp", first=STRUCTURE)
 
 
 def _check(path: Path, system: ConnectedSystem) -> None:

@@ -5,7 +5,6 @@ in 1/s, and only the servo, the period and delays say how large it may be. Secti
 metal plate and none on cardboard: an almost unstable loop of 4 ms shows that, and noise is enough to make it sound.
 """
 
-import math
 import os
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +14,7 @@ import numpy as np
 
 from gantrytau import Model, ModelError, StateSpace
 from gantrytau.answers.linear_systems.discretisation import held
+from gantrytau.border.checks import number
 from gantrytau.compiler.parameters import parameter_table
 from gantrytau.flattening.flatten import flatten
 
@@ -47,14 +47,11 @@ class ContactLoop:
     damping: float = 0.02
 
     def __post_init__(self):
-        for name in ("period",) if self.mode is None else ("period", "mode"):
-            value = getattr(self, name)
-            if not (_is_number(value) and value > 0):
-                raise ModelError(f"ContactLoop: found {name}={value!r}, expected a positive number")
-        for name in ("gain", "T_v", "delay", "damping"):
-            value = getattr(self, name)
-            if not (_is_number(value) and value >= 0):
-                raise ModelError(f"ContactLoop: found {name}={value!r}, expected a number of at least zero")
+        units = dict(period="s", mode="Hz", gain="1/s", T_v="s", delay="s", damping=None)
+        for name, unit in units.items():
+            limits = dict(above=0.0) if name in ("period", "mode") else dict(least=0.0)
+            if (found := getattr(self, name)) is not None or name != "mode":
+                object.__setattr__(self, name, number("ContactLoop", name, found, unit=unit, **limits))
 
     @cached_property
     def plant(self) -> StateSpace:
@@ -175,10 +172,6 @@ class ContactLoop:
         if file is not None:
             figure.savefig(file)
         return figure
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.number) and math.isfinite(value)
 
 
 def contact_loop(model: Model) -> ContactLoop:

@@ -6,7 +6,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Fixed, ModelError, Parameter, Real, connect, der, dot
+from gantrytau import Fixed, Parameter, Real, connect, der, dot
+from gantrytau.border.checks import array
 from gantrytau.mechanics.multibody import WorldForce
 from gantrytau_models.leadthrough.servo_and_sensors import LedArm
 from gantrytau_models.mechanisms.flexible import unstretched
@@ -39,14 +40,12 @@ class LedRobot(LedArm):
         start: Sequence[float] = (0.0, 0.0, -0.03),
         **modifications: Any,
     ):
-        for name, vector in (("place", place), ("start", start)):
-            if np.shape(vector) != (3,):
-                raise ModelError(f"LedRobot: found {name}={vector!r}, expected x, y and z in m")
-        tool = np.asarray(place, dtype=float) + np.array(DOWN) @ np.asarray(start, dtype=float)
+        origin = array("LedRobot", "place", place, (3,), unit="m")
+        tool = origin + np.array(DOWN) @ array("LedRobot", "start", start, (3,), unit="m")
         unstretched(prototype, tool)  # refuses what is out of reach
         robot = dict(GantryTau(prototype).modifications)
         robot["tool"] = dict(r=Fixed(list(tool)), v=Fixed([0.0, 0.0, 0.0]))
-        super().__init__(dict(place=list(place), robot=robot), **modifications)
+        super().__init__(dict(place=list(origin), robot=robot), **modifications)
 
     def equations(self):
         robot = self.robot

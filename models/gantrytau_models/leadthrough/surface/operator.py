@@ -5,7 +5,8 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, der, if_else, sampled, time
+from gantrytau import Input, Model, Output, Parameter, Real, der, if_else, sampled, time
+from gantrytau.border.checks import instance
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord
 
 DELAY = 10  # looks, 0.2 s, between what is seen and what is done about it
@@ -57,10 +58,7 @@ class Operator(Model):
     f = Output(3, unit="N", description="force on the handle")
 
     def __init__(self, record: OperatorRecord, *, pressing: bool = True, **modifications: Any):
-        if not isinstance(record, OperatorRecord):
-            raise ModelError(
-                f"Operator: found {type(record).__name__}, expected a record such as operators.SKILLED"
-            )
+        instance("Operator", "record", record, OperatorRecord, "a record such as operators.SKILLED")
         values = {name: getattr(record, name) for name in record.__dataclass_fields__ if name != "name"}
         super().__init__(values | ({} if pressing else dict(press=0.0)), **modifications)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import number
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,10 +38,7 @@ def plot_tool_force(runs: Mapping[str, Result], file: str | os.PathLike[str] | N
 
 
 def plot_oscillation(
-    runs: Mapping[str, Result],
-    *,
-    begin: float = 8.0,
-    file: str | os.PathLike[str] | None = None,
+    runs: Mapping[str, Result], *, begin: float = 8.0, file: str | os.PathLike[str] | None = None
 ) -> "Figure":
     """Figure 8.5: what sounds on a stiff plate, the force over 0.4 s from `begin`, s, and the spectra of all that follows.
 
@@ -49,6 +47,7 @@ def plot_oscillation(
     """
     from matplotlib.figure import Figure
 
+    number("plot_oscillation", "begin", begin, unit="s")
     _refuse_none(runs, "plot_oscillation")
     figure = Figure(figsize=(9, 4), layout="constrained")
     force, spectrum = figure.subplots(1, 2)

@@ -7,7 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from gantrytau import Input, Model, ModelError, Output, Parameter, Real, require, white_noise
+from gantrytau import Input, Model, Output, Parameter, Real, require, white_noise
+from gantrytau.border.checks import instance
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.language.model import merge
 from gantrytau_models.leadthrough.assumed import operators
@@ -88,10 +89,8 @@ class ToolOnSurface(Model):
         arm: LedArm | Mapping[str, Any] | None = None,
         **modifications: Any,
     ):
-        if not isinstance(surface, SurfaceRecord):
-            raise ModelError(
-                f"{type(self).__name__}: found {type(surface).__name__}, expected a record such as surfaces.METAL"
-            )
+        name = type(self).__name__
+        instance(name, "surface", surface, SurfaceRecord, "a record such as surfaces.METAL")
         face = {name: getattr(surface, name) for name in surface.__dataclass_fields__ if name != "name"}
         hand = Operator(operator, pressing=pressing).modifications
         if not isinstance(arm, LedArm):

@@ -240,9 +240,11 @@ def _affine(phase: Trajectory, expressions: ca.SX) -> tuple[np.ndarray, Any, np.
         bent |= np.array(ca.which_depends(expressions, signals, 2, True))
     rows = expressions[np.flatnonzero(~bent).tolist()] if not bent.all() else ca.SX(0, 1)
     evaluate = ca.Function("affine", [signals], [ca.jacobian(rows, signals), ca.densify(rows)])
-    slopes, offsets = evaluate(ca.DM.zeros(signals.numel()))
+    coefficients, offsets = evaluate(ca.DM.zeros(signals.numel()))
     matrix = (
-        scipy_matrix(slopes).tocoo() if slopes.numel() else sparse.coo_matrix((rows.numel(), signals.numel()))
+        scipy_matrix(coefficients).tocoo()
+        if coefficients.numel()
+        else sparse.coo_matrix((rows.numel(), signals.numel()))
     )
     return ~bent, matrix, np.array(offsets).ravel()
 

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import instance, number
+from gantrytau.border.refusal import Given
 from gantrytau.interruption import uninterrupted
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.answers.answer import Answer
@@ -23,6 +25,7 @@ from gantrytau_optimica.control.control_problem import Phase
 from gantrytau_optimica.problem.optimization import Optimization
 
 ALIKE = 1e-9  # relative: numbers of two runs closer than this are the same
+PLACE = "a folder or the name of a .json file"
 PASSING = ("started", "durations")  # differ between any two runs
 
 
@@ -40,10 +43,10 @@ def run_record(
     read_time: s spent on reading the problem. What is not given is None. Keys always come in the same order; numbers
     that JSON lacks are the words "inf", "-inf" and "nan".
     """
-    if not isinstance(optimum, Optimum):
-        raise ModelError(
-            f"run_record: found {optimum!r}, expected what optimize returned or its SolveError has as .optimum"
-        )
+    if read_time is not None:
+        number("run_record", "read_time", read_time, least=0.0)
+    expected = "what optimize returned or its SolveError has as .optimum"
+    instance("run_record", "optimum", optimum, Optimum, expected)
     program = optimum.program
     return plain(
         {
@@ -80,9 +83,7 @@ def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[s
         record = run_record(optimum, **details)
     else:
         record = _record("write_record", optimum)
-    if not isinstance(path, (str, os.PathLike)):
-        raise ModelError(f"write_record: found path={path!r}, expected a folder or the name of a .json file")
-    path = Path(path)
+    path = Path(instance("write_record", "path", path, (str, os.PathLike), PLACE))
     text = json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False)
     if path.is_dir():
         return _added(path, record, text)
@@ -97,19 +98,16 @@ def write_record(optimum: Optimum | Mapping[str, Any], path: str | os.PathLike[s
 
 def require_place(path: Any) -> None:
     """ModelError for a place to which no record can be written; a name that ends in "/" becomes a folder."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise ModelError(f"record={path!r}: expected a folder or the name of a .json file")
-    place = Path(path)
+    place = Path(instance("optimize", "record", path, (str, os.PathLike), PLACE))
     if str(path).endswith(("/", os.sep)):
         place.mkdir(parents=True, exist_ok=True)
     if place.is_dir():
         return
     if place.suffix.lower() != ".json":
-        raise ModelError(
-            f"record={path}: found neither a folder nor a name that ends in .json, expected one of them"
-        )
+        raise ModelError(f"expected {PLACE}", place="optimize", found=Given("record", path))
     if not place.parent.is_dir():
-        raise ModelError(f"record={path}: there is no folder {place.parent}; make it first")
+        missing = f"there is no folder {place.parent}; make it first"
+        raise ModelError(missing, place="optimize", found=Given("record", path))
 
 
 def compare_records(a: Mapping[str, Any], b: Mapping[str, Any]) -> str:

@@ -38,9 +38,9 @@ def measured(trajectory: Trajectory, values: Callable[[ca.SX], np.ndarray]) -> M
     if not limits:
         return []
     parts = [terms(limit.expression) for limit in limits]
-    slopes = _slopes([limit.expression for limit in limits], phase.signals)
+    changes = _ranges_to_first_order([limit.expression for limit in limits], phase.signals)
     rows = values(ca.vertcat(*(limit.expression for limit in limits)))
-    inside = trajectory.values(ca.vertcat(*slopes, *(t for part in parts for t in part)), trajectory.time)
+    inside = trajectory.values(ca.vertcat(*changes, *(t for part in parts for t in part)), trajectory.time)
     sizes = iter(_largest(inside))
     moves = [next(sizes) for _ in limits]
     largest = [max((next(sizes) for _ in part), default=0.0) for part in parts]
@@ -72,8 +72,8 @@ def condition_sizes(
         for point in phase.points:
             elements = point.expression.elements()
             parts = [terms(e) for e in elements]
-            slopes = _slopes(elements, phase.signals)
-            asked = ca.vertcat(point.expression, *slopes, *(t for part in parts for t in part))
+            changes = _ranges_to_first_order(elements, phase.signals)
+            asked = ca.vertcat(point.expression, *changes, *(t for part in parts for t in part))
             rows = values(number, point, asked)
             rest = iter(_largest(rows[:, None])[len(elements) :])
             moves = [next(rest) for _ in elements]
@@ -89,8 +89,8 @@ def condition_sizes(
     typical = ca.DM(np.concatenate(sizes))
     rows = []
     for limit in problem.boundary:
-        slope = ca.fabs(ca.densify(ca.jacobian(limit.expression, ca.vertcat(*symbols)))) @ typical
-        rows.append(ca.mmax(ca.vertcat(slope, *(ca.fabs(t) for t in terms(limit.expression)))))
+        change = ca.fabs(ca.densify(ca.jacobian(limit.expression, ca.vertcat(*symbols)))) @ typical
+        rows.append(ca.mmax(ca.vertcat(change, *(ca.fabs(t) for t in terms(limit.expression)))))
     inside = np.array(ca.Function("sizes", symbols, [ca.vertcat(ca.SX(0, 1), *rows)])(*found)).ravel()
     bounds = np.array([[limit.lower, limit.upper] for limit in problem.boundary]).reshape(-1, 2)
     bounds = np.max(np.abs(np.where(np.isfinite(bounds), bounds, 0.0)), axis=1)
@@ -165,14 +165,14 @@ def _combined(one: ca.SX, inner: Sequence[ca.SX]) -> ca.SX:
     return inner[0] if inner else ca.fabs(one)
 
 
-def _slopes(expressions: Sequence[ca.SX], signals: Sequence[Signal]) -> list[ca.SX]:
+def _ranges_to_first_order(expressions: Sequence[ca.SX], signals: Sequence[Signal]) -> list[ca.SX]:
     """For each scalar, by how much it changes at most when every signal changes by its typical size."""
     symbols = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in signals))
     sizes = ca.DM([s.nominal for s in signals])
     if not symbols.numel():
         return [ca.SX(0) for _ in expressions]
-    slopes = ca.fabs(ca.densify(ca.jacobian(ca.vertcat(*expressions), symbols)))
-    return (slopes @ sizes).elements()
+    changes = ca.fabs(ca.densify(ca.jacobian(ca.vertcat(*expressions), symbols)))
+    return (changes @ sizes).elements()
 
 
 def _largest(rows: np.ndarray) -> np.ndarray:

@@ -202,7 +202,7 @@ class _System:
     kept: np.ndarray  # numbers of the algebraics that the integrator solves for
     equations: (
         ca.Function
-    )  # (place, x, kept z, p) -> all algebraics, rates by the place, residuals, their slopes by z
+    )  # (place, x, kept z, p) -> all algebraics, rates by the place, residuals, their Jacobian by z
 
     def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
         """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
@@ -224,8 +224,8 @@ class _System:
         begun, last = (x, kept), AGREED
         while True:
             if kept.size:
-                _, _, residuals, slopes = self._values(x, kept, p)
-                matrices = slopes.reshape(kept.shape[0], PLACES.size, kept.shape[0]).swapaxes(0, 1)
+                _, _, residuals, jacobian = self._values(x, kept, p)
+                matrices = jacobian.reshape(kept.shape[0], PLACES.size, kept.shape[0]).swapaxes(0, 1)
                 try:
                     kept = kept - np.linalg.solve(matrices, residuals.T[..., None])[..., 0].T
                 except np.linalg.LinAlgError:  # singular at one of the places
@@ -258,8 +258,8 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     z = ca.vertcat(ca.SX(0, 1), *(symbols[i] for i in kept))
     p = ca.vertcat(values, begin, span, problem.numbers)
     scaled = ca.SX.sym("scaled", x.numel())
-    rates, slopes = ode * span, ca.jacobian(residuals, z)
-    equations = [ca.densify(one) for one in (algebraics, rates, residuals, slopes)]
+    rates, jacobian = ode * span, ca.jacobian(residuals, z)
+    equations = [ca.densify(one) for one in (algebraics, rates, residuals, jacobian)]
     ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
     dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
     options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 1000}

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from gantrytau import GantryTauError
+from gantrytau.border.checks import number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation, held_out
 from gantrytau_optimica.calibration.calibration import Calibration
@@ -10,7 +11,7 @@ from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.diagnostics.tool_error import Loose, ToolError, tool_error
 from gantrytau_optimica.calibration.links.groups import TAPE
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.finding import Finding, length_text
 
 SHOWN = 3  # combinations that are named
 MEASURE = "measure the poses that are missing, or plan again with more of them"
@@ -57,6 +58,8 @@ def judge(
     the error of the tool where it is to work, by default at the poses that were fitted; tape: standard deviation of
     nominal values, m. Raises ModelError for models that no robot can hold, where `expected` is not given.
     """
+    number("judge", "tape", tape, above=0.0)
+    number("judge", "wanted", wanted, above=0.0)
     checked = found if isinstance(found, CrossValidation) else held_out(found)
     fit = checked.calibration
     named = isinstance(fit, NamedCalibration)
@@ -65,8 +68,10 @@ def judge(
     )
     error = float(fit.expected.mean()) if named else (expected or expected_error(fit, tape=tape)).error
     good = bool(fit.success and checked.error <= wanted and error <= wanted)
-    words = f"{_validated(checked)}, {um(error)} of the tool are expected {where} by what was measured, "
-    words += f"{um(wanted)} were wanted"
+    words = (
+        f"{_validated(checked)}, {length_text(error)} of the tool are expected {where} by what was measured, "
+    )
+    words += f"{length_text(wanted)} were wanted"
     if not good:
         advice = "name more parameters, or measure more poses" if named else MEASURE
         words += f"; look at the findings, {advice}"
@@ -90,8 +95,8 @@ def _of_frame(found: Calibration | NamedCalibration, good: bool, tape: float) ->
     before = expected_error(found, tape=tape, noise=NOTHING_MEASURED)
     return (
         f"{holds}: R and t follow from nominal values, so that in coordinates of the base the tool may be off by "
-        f"{um(before.error)}, as before, where these are {um(tape)} off; measure in the base of the robot and take "
-        "frame='base' to know it there."
+        f"{length_text(before.error)}, as before, where these are {length_text(tape)} off; measure in the base of the robot "
+        "and take frame='base' to know it there."
     )
 
 
@@ -111,17 +116,12 @@ def _validated(checked: CrossValidation) -> str:
         return "no poses that were not fitted validate this"
     count = len(checked.calibration.left_out)
     without = f", {_outliers(count)} left out" if count else ""
-    return f"{um(checked.error)} in the mean of poses that were not fitted{without}"
+    return f"{length_text(checked.error)} in the mean of poses that were not fitted{without}"
 
 
 def _outliers(count: int) -> str:
     words = ("no", "one", "two", "three", "four", "five", "six")
     return f"{words[count] if count < len(words) else count} outlier{'' if count == 1 else 's'}"
-
-
-def um(length: float) -> str:
-    """A length in micrometres or millimetres, whichever reads better."""
-    return f"{length * 1e6:.3g} um" if length < 1e-3 else f"{length * 1e3:.3g} mm"
 
 
 def told_by_tool(
@@ -132,6 +132,8 @@ def told_by_tool(
     expected: by default at the poses that were fitted; least: m, by which the tool must move to be worth a word, by default
     the noise; tape: deviation of nominal values, m.
     """
+    number("told_by_tool", "tape", tape, above=0.0)
+    least = None if least is None else number("told_by_tool", "least", least, least=0.0)
     if isinstance(found, NamedCalibration):  # its words are those of the numbers already
         return found
     if expected is None:
@@ -155,10 +157,10 @@ def _loose(moving: list[Loose], quiet: int, tape: float) -> str:
     harmless = f"{quiet} combinations of numbers are known by nominal values alone, but do not move the tool"
     if not moving:
         return f"{harmless}: this is harmless"
-    shown = "; ".join(f"{', '.join(one.names)} by {um(one.moves)}" for one in moving[:SHOWN])
+    shown = "; ".join(f"{', '.join(one.names)} by {length_text(one.moves)}" for one in moving[:SHOWN])
     more = f"; and {len(moving) - SHOWN} more" if len(moving) > SHOWN else ""
     found = (
-        f"data do not hold all that moves the tool; where nominal values are {um(tape)} off, together {shown}{more}; "
-        "measure more poses, spread over the workspace"
+        f"data do not hold all that moves the tool; where nominal values are {length_text(tape)} off, together "
+        f"{shown}{more}; measure more poses, spread over the workspace"
     )
     return f"{found}. {harmless}" if quiet else found

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Model, ModelError
+from gantrytau import Model
+from gantrytau.border.checks import whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.calibrate import calibrate
 from gantrytau_optimica.calibration.calibration import Calibration
@@ -67,20 +68,16 @@ def cross_validate(
     `calibrate`, but for `holdout`. Errors are NaN where the other parts are too few to calibrate the robot; for all poses
     together CalibrationError and ModelError as of `calibrate`.
     """
-    if not isinstance(parts, int) or parts < 2:
-        raise ModelError(
-            f"cross_validate: found parts={parts!r}, expected a whole number from 2, each held out in turn",
-            argument="parts",
-        )
-    whole = calibrate(robot, measurements, **policy, holdout=None)
+    whole("cross_validate", "parts", parts, least=2)
+    every = calibrate(robot, measurements, **policy, holdout=None)
     errors = np.full(len(measurements), np.nan)
     for part in range(parts):
-        rows = whole.rows[part::parts]
+        rows = every.rows[part::parts]
         try:
             fit = calibrate(robot, measurements, **policy, holdout=rows) if rows.size else None
         except CalibrationError:
             fit = None
         if fit is None:
-            return CrossValidation(whole, np.full(len(measurements), np.nan))
+            return CrossValidation(every, np.full(len(measurements), np.nan))
         errors[fit.held_out] = fit.errors
-    return CrossValidation(whole, errors)
+    return CrossValidation(every, errors)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
 
 FEWEST = 8  # poses: a link of a three-link robot has seven parameters
 LARGEST = 50.0  # m, reach of robots; what is farther apart was not written in m
@@ -12,6 +12,7 @@ FLAT = 2e-3  # extent across a line or plane by that along it, below which it is
 BITS = 20  # a million places, in which few of 100,000 rows meet by chance
 SAMPLE = 2000  # rows that show how far all extend
 MOVED = 1e-3  # m or rad, more than noise of a pose that is measured twice
+SPREAD = "spread them over the workspace in three directions"
 NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
 
 
@@ -38,8 +39,7 @@ def _not_finite(finite: np.ndarray) -> Iterator[Finding]:
     bad = np.flatnonzero(~finite)
     if bad.size:
         hold, left = agreeing(bad, "hold"), agreeing(bad, "are")
-        words = f"{rows_in_words(bad, len(finite))} {hold} no finite numbers and {left} left out"
-        yield Finding("nan", bad, words)
+        yield Finding("nan", bad, (Rows(bad, len(finite)), f" {hold} no finite numbers and {left} left out"))
 
 
 def _few(rows: np.ndarray) -> Iterator[Finding]:
@@ -52,13 +52,11 @@ def _few(rows: np.ndarray) -> Iterator[Finding]:
 def _repeated(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     later = repeated_rows(q, r)
     if later.size:
-        repeat = agreeing(later, "repeat")
-        yield Finding(
-            "duplicates",
-            rows[later],
-            f"{rows_in_words(rows[later])} {repeat} earlier rows to the last digit; a copied row adds no knowledge but "
-            "counts twice in every deviation; it is left out",
+        words = (
+            f" {agreeing(later, 'repeat')} earlier rows to the last digit; a copied row adds no knowledge but counts twice "
+            "in every deviation; it is left out"
         )
+        yield Finding("duplicates", rows[later], (Rows(rows[later]), words))
 
 
 def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
@@ -70,8 +68,8 @@ def _stuck(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
         if places.size:
             bad = rows[places]
             left = agreeing(bad, "they are")
-            words = f"{name} of {rows_in_words(bad)} is that of the row before while {other} moved; {left} left out"
-            yield Finding("stuck", bad, words)
+            words = f" is that of the row before while {other} moved; {left} left out"
+            yield Finding("stuck", bad, (f"{name} of ", Rows(bad), words))
 
 
 def repeated_rows(*tables: np.ndarray) -> np.ndarray:
@@ -117,17 +115,9 @@ def _shape(r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
     r = _some(r)
     extent = np.sqrt(np.maximum(np.linalg.eigvalsh(np.cov(r.T))[::-1], 0.0))
     if extent[0] == 0.0 or extent[1] < FLAT * extent[0]:
-        yield Finding(
-            "line",
-            rows,
-            "all tool positions lie on a line; spread them over the workspace in three directions",
-        )
+        yield Finding("line", rows, f"all tool positions lie on a line; {SPREAD}")
     elif extent[2] < FLAT * extent[0]:
-        yield Finding(
-            "plane",
-            rows,
-            "all tool positions lie in a plane; spread them over the workspace in three directions",
-        )
+        yield Finding("plane", rows, f"all tool positions lie in a plane; {SPREAD}")
 
 
 def _some(x: np.ndarray) -> np.ndarray:
@@ -158,8 +148,12 @@ def _units(q: np.ndarray, r: np.ndarray, rows: np.ndarray) -> Iterator[Finding]:
         yield Finding(
             "millimetres",
             rows[found],
-            f"{names} of {rows_in_words(rows[found])} {extend} over more than {LARGEST:g} m, expected m and rad; divide by "
-            "1000 if they are mm, turn degrees into rad",
+            (
+                f"{names} of ",
+                Rows(rows[found]),
+                f" {extend} over more than {LARGEST:g} m, expected m and rad; divide by 1000 if they are mm, turn degrees "
+                "into rad",
+            ),
         )
 
 
@@ -172,7 +166,7 @@ def _rotations(R: np.ndarray | None, rows: np.ndarray) -> Iterator[Finding]:
         yield Finding(
             "rotations",
             rows[bad],
-            f"R of {rows_in_words(rows[bad])} is no rotation matrix; expected R' R = I and determinant 1",
+            ("R of ", Rows(rows[bad]), " is no rotation matrix; expected R' R = I and determinant 1"),
         )
 
 

@@ -10,7 +10,9 @@ from typing import Any, Self
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array
 from gantrytau.border.columns import Columns
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import of_quaternions, quaternions
 from gantrytau.whole_files import replacing
@@ -40,22 +42,17 @@ class Measurements(Record):
     def __init__(
         self, q: Any, r: Any, R: Any = None, rails: Sequence[Any] | None = None, *, numbers: Any = None
     ):
-        self.q = _numbers("q", q)
-        self.r = _numbers("r", r)
-        if self.q.ndim != 2 or self.r.shape != (len(self.q), 3):
-            raise ModelError(
-                f"Measurements: found q of shape {self.q.shape} and r of shape {self.r.shape}, expected (N, n) and (N, 3), "
-                "one row for each pose"
-            )
+        self.q = array("Measurements", "q", q, (None, None), finite=False)
+        self.r = array("Measurements", "r", r, (len(self.q), 3), finite=False)
         self.R = None if R is None else _orientations(R, len(self.q))
         self.rails = None if rails is None else tuple(_rail(k, rail) for k, rail in enumerate(rails))
         self.numbers = None if numbers is None else np.array(numbers, dtype=int).reshape(len(self.q))
         self.lines: np.ndarray | None = None
         self.covariance: np.ndarray | None = None
         self.shared: np.ndarray | None = None
-        for array in (self.q, self.r, self.R, *(self.rails or ())):
-            if array is not None:
-                array.flags.writeable = False
+        for values in (self.q, self.r, self.R, *(self.rails or ())):
+            if values is not None:
+                values.flags.writeable = False
 
     @classmethod
     def read(cls, path: str | Path, rails: Sequence[Any] | None = None) -> Self:
@@ -113,7 +110,7 @@ class Measurements(Record):
         """Which rows hold numbers only, (N,)."""
         arrays = [self.q, self.r] if self.R is None else [self.q, self.r, self.R]
         with np.errstate(invalid="ignore", over="ignore"):
-            if all(np.isfinite(array.sum()) for array in arrays):
+            if all(np.isfinite(values.sum()) for values in arrays):
                 return np.ones(len(self), dtype=bool)
         good = np.isfinite(self.q).all(axis=1) & np.isfinite(self.r).all(axis=1)
         return np.asarray(good if self.R is None else good & np.isfinite(self.R).all(axis=(1, 2)))
@@ -151,28 +148,21 @@ class Measurements(Record):
         shared: F (N, 3, k) in m, the part F_i F_j' that errors of positions have in common, as by cameras.
         Raises ModelError for other shapes, and for covariances of finite positions that are not finite and above zero.
         """
-        given = _numbers("covariance", covariance)
-        if given.shape != (len(self), 3, 3):
-            raise ModelError(
-                f"Measurements: found covariance of shape {given.shape}, expected ({len(self)}, 3, 3) in m2"
-            )
+        given = array("Measurements", "covariance", covariance, (len(self), 3, 3), finite=False)
         known = np.isfinite(self.r).all(axis=1)
         wrong = np.flatnonzero(known & ~(np.trace(given, axis1=1, axis2=2) > 0))
         if wrong.size or not np.all(np.isfinite(given[known])):
+            first = (*wrong, *np.flatnonzero(known & ~np.isfinite(given).all(axis=(1, 2))))[0]
             raise ModelError(
-                f"Measurements: found a covariance that is not finite or not above zero, the first in row "
-                f"{wrong[0] if wrong.size else np.flatnonzero(known & ~np.isfinite(given).all(axis=(1, 2)))[0]}, expected "
-                "squares of m"
+                f"Measurements: found a covariance that is not finite or not above zero, the first in row {first}, expected "
+                "squares of m",
+                argument="covariance",
             )
         found = self.select(slice(None))
         found.covariance = given
         found.covariance.flags.writeable = False
         if shared is not None and np.size(shared):
-            found.shared = _numbers("shared", shared)
-            if found.shared.ndim != 3 or found.shared.shape[:2] != (len(self), 3):
-                raise ModelError(
-                    f"Measurements: found shared of shape {found.shared.shape}, expected ({len(self)}, 3, k) in m"
-                )
+            found.shared = array("Measurements", "shared", shared, (len(self), 3, None))
         return found
 
     @property
@@ -227,39 +217,24 @@ def is_all(rows: np.ndarray, count: int) -> bool:
     )
 
 
-def _numbers(name: str, values: Any) -> np.ndarray:
-    try:
-        return np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ModelError(
-            f"Measurements: found {name} that is no array of numbers ({error}), expected rows of numbers"
-        ) from None
-
-
 def _orientations(R: Any, count: int) -> np.ndarray:
-    found = _numbers("R", R)
-    if found.shape == (count, 4):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return of_quaternions(found / np.linalg.norm(found, axis=1, keepdims=True))
-    if found.shape == (count, 3, 3):
+    """Rotation matrices (N, 3, 3) of these, or of quaternions (N, 4), scalar first."""
+    found = array("Measurements", "R", R, (count, 3, 3), (count, 4), finite=False)
+    if found.ndim == 3:
         return found
-    raise ModelError(
-        f"Measurements: found R of shape {found.shape} for {count} poses, expected ({count}, 3, 3) rotation matrices or "
-        f"({count}, 4) quaternions, scalar first"
-    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return of_quaternions(found / np.linalg.norm(found, axis=1, keepdims=True))
 
 
 def _rail(k: int, rail: Any) -> np.ndarray:
-    found = _numbers(f"rails[{k}]", rail)
-    if found.ndim != 2 or found.shape[1] != 4 or len(found) < 2 or not np.isfinite(found).all():
-        raise ModelError(
-            f"Measurements: found rails[{k}] of shape {found.shape}{'' if np.isfinite(found).all() else ' with NaN'}, "
-            "expected finite (k, 4), the columns q, x, y, z of two points or more"
-        )
+    name = f"rails[{k}]"
+    found = array("Measurements", name, rail, (None, 4))
     found = found[np.argsort(found[:, 0], kind="stable")]
-    if np.any(np.diff(found[:, 0]) == 0):
+    if len(found) < 2 or np.any(np.diff(found[:, 0]) == 0):
         raise ModelError(
-            f"Measurements: found rails[{k}] with several points at one q, expected one; average them first"
+            "expected q, x, y, z of two points or more, one at each q; average them first",
+            place="Measurements",
+            found=Given(name, rail),
         )
     return found
 

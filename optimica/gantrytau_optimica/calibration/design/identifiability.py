@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gantrytau import Model, ModelError, StructureError
+from gantrytau.border.checks import array, check_words, number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.links.arm_factors import (
@@ -26,9 +27,9 @@ from gantrytau_optimica.calibration.links.arm_factors import (
 )
 from gantrytau_optimica.calibration.links.arm_poses import pose_rows
 from gantrytau_optimica.calibration.links.groups import TAPE
+from gantrytau_optimica.fitting.rank import dependencies
 
 NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
-TAKES_PART = 0.05  # of a direction: components below are exact but negligible, as those Table 5.4 leaves out
 
 
 class PoseArrays(NamedTuple):
@@ -135,7 +136,8 @@ def identifiability(
     for nothing.
     Raises ModelError for another robot, or for arrays that do not fit.
     """
-    check_deviations(noise, angle, tape)
+    check_words(identifiability, locals())
+    check_deviations("identifiability", noise, angle, tape)
     poses, _ = finite_poses(measurements)
     return Identifiability(
         tuple(_of_arm(arm, poses, (noise, angle), tape) for arm in read_arms(robot, orientation, gains=gains))
@@ -158,19 +160,10 @@ def measured_poses(measurements: Any) -> PoseArrays:
 def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
     """The poses of measurements whose numbers are finite, and their rows; ModelError if there are none."""
     found = measured_poses(measurements)
-    try:
-        q, r = (np.asarray(each, dtype=float) for each in (found.q, found.r))
-        R = None if found.R is None else np.asarray(found.R, dtype=float)
-    except (TypeError, ValueError):
-        raise ModelError(
-            "measurements: found q, r or R that hold no numbers, expected arrays of them"
-        ) from None
+    q = array("measurements", "q", found.q, (None, None), finite=False)
+    r = array("measurements", "r", found.r, (len(q), 3), finite=False)
+    R = None if found.R is None else array("measurements", "R", found.R, (len(q), 3, 3), finite=False)
     arrays = [q, r, *([] if R is None else [R])]
-    if any(each.ndim < 2 or len(each) != len(q) for each in arrays):
-        shapes = ", ".join(str(each.shape) for each in arrays)
-        raise ModelError(
-            f"measurements: found arrays of the shapes {shapes}, expected q (N, n), r (N, 3), R (N, 3, 3)"
-        )
     rows = np.flatnonzero(
         np.all([np.isfinite(each).all(axis=tuple(range(1, each.ndim))) for each in arrays], axis=0)
     )
@@ -181,16 +174,11 @@ def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
     return PoseArrays(q[rows], r[rows], None if R is None else R[rows]), rows
 
 
-def check_deviations(noise: float, angle: float, tape: float) -> None:
+def check_deviations(place: str, noise: float, angle: float, tape: float) -> None:
     """ModelError for standard deviations of measurement and tape that are not above zero, or of angles below it."""
-    for name, value, least in (
-        ("noise", noise, "above 0"),
-        ("tape", tape, "above 0"),
-        ("angle", angle, "0 or more"),
-    ):
-        number = isinstance(value, int | float | np.number) and np.isfinite(value)
-        if not number or value < 0 or (value == 0 and name != "angle"):
-            raise ModelError(f"{name}: found {value!r}, expected a standard deviation {least}")
+    number(place, "noise", noise, above=0.0)
+    number(place, "angle", angle, least=0.0)
+    number(place, "tape", tape, above=0.0)
 
 
 def _of_arm(
@@ -222,29 +210,3 @@ def _of_arm(
 def deviations(noise: tuple[float, float], R: np.ndarray | None) -> np.ndarray:
     """Standard deviations of the coordinates of a measured pose, (3,) in m, or (6,) in m and rad."""
     return np.repeat(noise, 3)[: 3 if R is None else 6]
-
-
-def dependencies(directions: np.ndarray, scale: np.ndarray, names: tuple[str, ...]) -> dict[str, list[str]]:
-    """Directions (k, p), orthonormal in the scaled unknowns, as k redundant parameters with their dependent ones.
-
-    From the last parameter to the first each that takes part in some direction becomes redundant and leaves the rest,
-    until none is left: the reduced echelon form, but for pivots that are negligible.
-    """
-    left, pivots = directions, []
-    for k in reversed(range(len(names))):
-        if len(left) == 0:
-            break
-        size = np.linalg.norm(left[:, k])
-        if size > TAKES_PART:
-            pivots.append(k)
-            # a basis of what has no component k any more
-            left = np.linalg.qr(np.column_stack([left[:, k] / size, np.eye(len(left))]))[0][:, 1:].T @ left
-    pivots = sorted(pivots)
-    if not pivots:
-        return {}
-    unscaled = directions * scale
-    rows = np.linalg.lstsq(unscaled[:, pivots].T, np.eye(len(pivots)), rcond=None)[0].T @ unscaled
-    return {
-        names[pivot]: [names[k] for k in range(len(names)) if k not in pivots and abs(row[k]) > TAKES_PART]
-        for pivot, row in zip(pivots, rows, strict=True)
-    }

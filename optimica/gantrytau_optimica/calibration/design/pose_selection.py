@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import check_words, number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.design.identifiability import (
     NOTHING,
@@ -27,14 +28,13 @@ from gantrytau_optimica.calibration.design.identifiability import (
     finite_poses,
 )
 from gantrytau_optimica.calibration.design.pose_exchange import exchanged
-from gantrytau_optimica.calibration.fitting.pose_residuals import named_slopes
+from gantrytau_optimica.calibration.fitting.pose_residuals import named_jacobian
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
 from gantrytau_optimica.calibration.links.arm_factors import NOISE, checked_poses, scales
 from gantrytau_optimica.calibration.links.arm_poses import pose_rows, tool_gain
 from gantrytau_optimica.calibration.links.groups import TAPE
 
 Method = Literal["d-optimal", "tool", "condition", "random"]
-METHODS = ("d-optimal", "tool", "condition", "random")
 PASS = 0.1  # of the poses that are too many, left out before (5.9) is evaluated anew
 SLACK = 0.014  # of log det for each unknown: 0.7 % of its deviation, for 4 to 6 % less error of the tool
 ENOUGH = 1.05  # of the fewest poses
@@ -76,20 +76,18 @@ def select_poses(
     "random"; seed: of the poses that exchange begins with; parameters, joints: of any robot, as of `calibrate`.
     Raises ModelError for another method, robot or number, and for arrays that do not fit.
     """
-    if method not in METHODS:
-        raise ModelError(f"method: found {method!r}, expected one of {', '.join(map(repr, METHODS))}")
+    check_words(select_poses, locals())
+    whole("select_poses", "seed", seed, least=0)
+    whole("select_poses", "n", n, least=1)
     if parameters is None:
         arms, poses, rows = _candidates(robot, measurements, orientation)
         blocks, weights = ([], []) if method == "random" else _blocks(arms, poses)
     else:
         poses, rows = finite_poses(measurements)
-        J = named_slopes(robot, parameters, joints, poses)
+        J = named_jacobian(robot, parameters, joints, poses)
         there = np.isfinite(J).all(axis=(1, 2))
         rows, (blocks, weights) = rows[there], _held([J[there]], [J[there, :3]])
-    if not (isinstance(n, int | np.integer) and 0 < n <= len(rows)):
-        raise ModelError(
-            f"n: found {n!r}, expected 1 to {len(rows)}, as many poses as there are with finite numbers"
-        )
+    whole("select_poses", "n", n, most=len(rows))
     start = np.random.default_rng(seed).choice(len(rows), n, replace=False)
     if method != "random":
         if method == "condition":
@@ -119,13 +117,15 @@ def predict(
     deviations are divided.
     Raises ModelError for another robot or arrays that do not fit, SolveError at a singular pose.
     """
-    check_deviations(noise, angle, tape)
+    check_words(predict, locals())
+    check_deviations("predict", noise, angle, tape)
     arms, poses, finite = _candidates(robot, measurements, orientation)
     if rows is not None and np.asarray(rows).dtype == bool:
         rows = np.flatnonzero(rows)
     if rows is not None and not np.isin(rows, finite).all():
         raise ModelError(
-            "rows: found some that the candidates do not have with finite numbers, expected rows of them"
+            "predict: found rows that the candidates do not have with finite numbers, expected rows of them",
+            argument="rows",
         )
     chosen = poses if rows is None else _rows_of(poses, np.searchsorted(finite, rows))
     there = poses if at is None else _candidates(robot, at, orientation)[1]
@@ -148,7 +148,9 @@ def enough_poses(
     measurements: candidates, as for `select_poses`; error: in m, over the candidates; noise, angle, tape: as for `predict`.
     Raises ModelError where even all of the candidates are not enough.
     """
-    check_deviations(noise, angle, tape)
+    whole("enough_poses", "seed", seed, least=0)
+    check_deviations("enough_poses", noise, angle, tape)
+    number("enough_poses", "error", error, above=0.0)
     arms, poses, finite = _candidates(robot, measurements, "local")
     blocks, weights = _blocks(arms, poses)
     gains = _gains(arms, poses)
@@ -160,8 +162,9 @@ def enough_poses(
     chosen = np.arange(len(finite))
     if not (least := expected(chosen)) <= error:
         raise ModelError(
-            f"error: all {len(finite)} candidates leave {least:.3g} m, expected no more than {error:.3g} m; offer more "
-            "or other poses, or a better device"
+            f"enough_poses: all {len(finite)} candidates leave {least:.3g} m, expected no more than {error:.3g} m; offer "
+            "more or other poses, or a better device",
+            argument="error",
         )
     few, many = 0, len(finite)
     while many > max(few + 1, ENOUGH * few):

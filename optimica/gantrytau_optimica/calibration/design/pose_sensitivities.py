@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau import Model, ModelError
-from gantrytau.border.refusal import did_you_mean
+from gantrytau.border.checks import array, check_words, number
+from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics
-from gantrytau.kinematics.poses import floats, real, shown, vectors
+from gantrytau.kinematics.poses import vectors
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses, measured_poses
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure, Orientation, read_arms
@@ -72,8 +73,7 @@ class PoseSensitivities(Record):
 
     def summed(self, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
         """What (5.8) sums over poses and both signs of a step, to first order: (p,) in m, and (p,) in rad."""
-        if not 0 < real(step) < np.inf:
-            raise ModelError(f"summed: found step={step!r}, expected a length above 0 in m", argument="step")
+        number("summed", "step", step, above=0.0)
         return 2 * step * np.nansum(self.sizes, axis=0), 2 * step * np.nansum(self.turns, axis=0)
 
     def spread(self, deviations: float | Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
@@ -87,9 +87,7 @@ class PoseSensitivities(Record):
         )
         each = np.zeros(len(self.names))
         for name, value in given.items():
-            if not 0 <= real(value) < np.inf:
-                raise ModelError(f"spread: found {name} = {value!r}, expected a deviation of at least 0")
-            each[self._columns(name)] = value
+            each[self._columns(name)] = number("spread", name, value, least=0.0)
         return tuple(np.sqrt((size**2) @ each**2) for size in (self.sizes, self.turns))  # type: ignore[return-value]
 
     def __str__(self) -> str:
@@ -177,6 +175,7 @@ def pose_sensitivities(
     coordinates q(k) at which its guideway was measured, rising, by default those of the record's `rails`: their errors are
     parameters, too. Raises ModelError for another robot and arrays that do not fit, SolveError where links cannot be closed.
     """
+    check_words(pose_sensitivities, locals())
     arms = read_arms(robot, orientation)
     at, rows, count = _poses(robot, measurements)
     q, r, R = [checked_poses(arm, *at) for arm in arms][-1]
@@ -227,12 +226,13 @@ def _rail_places(measurements: Any) -> Sequence[Any] | None:
 
 def _rising(places: Any, guideway: int) -> np.ndarray:
     """Coordinates at which a guideway was measured, (k,) in m, two at least."""
-    found = floats(places)
-    if found.ndim != 1 or len(found) < 2 or not (np.isfinite(found).all() and (np.diff(found) > 0).all()):
+    name = f"guideways[{guideway}]"
+    found = array("pose_sensitivities", name, places, (None,))
+    if len(found) < 2 or not (np.diff(found) > 0).all():
         raise ModelError(
-            f"guideways[{guideway}]: found {shown(places)}, expected two coordinates at least, in m, each "
-            "above the one before",
-            argument="guideways",
+            "expected two coordinates at least, in m, each above the one before",
+            place="pose_sensitivities",
+            found=Given(name, places),
         )
     return found
 

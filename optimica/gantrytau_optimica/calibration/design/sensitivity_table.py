@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import check_words, number
+from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays, finite_poses
@@ -42,9 +44,7 @@ class SensitivityTable(Record):
     def of(self, name: str) -> tuple[float, float, float]:
         """Position, angle and cost of one parameter; ModelError for an unknown name."""
         if name not in self.names:
-            raise ModelError(
-                f"sensitivity_table: there is no {name!r}, expected one of {', '.join(self.names)}"
-            )
+            raise ModelError(f"sensitivity_table: there is no {name!r}{did_you_mean(str(name), self.names)}")
         k = self.names.index(name)
         return float(self.position[k]), float(self.angle[k]), float(self.cost[k])
 
@@ -69,8 +69,8 @@ def sensitivity_table(
     Raises ModelError for another robot, arrays that do not fit or a step that is not above zero, SolveError where links
     cannot be closed.
     """
-    if not (isinstance(step, int | float | np.number) and 0 < step < np.inf):
-        raise ModelError(f"step: found {step!r}, expected a length above 0 in m")
+    check_words(sensitivity_table, locals())
+    number("sensitivity_table", "step", step, above=0.0)
     arms, (poses, _) = read_arms(robot, orientation), finite_poses(measurements)
     q, r, R = [checked_poses(arm, *poses) for arm in arms][-1]
     here = PoseArrays(q, *poses_of(arms, q, r, R))

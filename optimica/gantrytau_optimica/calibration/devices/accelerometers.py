@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import array, number
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.devices.devices import Array, checked_rotation, numbers
+from gantrytau_optimica.calibration.devices.devices import Array, checked_rotation
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
 
-FINE = (
-    40  # steps for each period of the bandwidth, between which the acceleration is taken as a straight line
-)
+# steps for each period of the bandwidth, between which the acceleration is taken as a straight line
+FINE = 40
 TOLD = 1e-6  # of the squares of what is felt: less across the main direction does not tell a turn about it
 
 
@@ -34,17 +34,11 @@ class Accelerometer(Record):
     gravity: Any = (0.0, 0.0, -9.81)
 
     def __post_init__(self):
+        number("Accelerometer", "noise", self.noise, least=0.0)
+        number("Accelerometer", "range", self.range, above=0.0)
+        number("Accelerometer", "bandwidth", self.bandwidth, above=0.0)
         object.__setattr__(self, "R", checked_rotation("Accelerometer", self.R))
-        object.__setattr__(self, "gravity", numbers(self.gravity))
-        for name, least in (("noise", 0.0), ("range", 1e-300), ("bandwidth", 1e-300)):
-            found = numbers(value := getattr(self, name))
-            if found.shape != () or not (np.isfinite(found) and found >= least):
-                bound = "that is not negative" if name == "noise" else "above 0"
-                raise ModelError(f"Accelerometer: found {name}={value!r}, expected a finite number {bound}")
-        if self.gravity.shape != (3,) or not np.all(np.isfinite(self.gravity)):
-            raise ModelError(
-                f"Accelerometer: found gravity={self.gravity!r}, expected three finite numbers, m/s2"
-            )
+        object.__setattr__(self, "gravity", array("Accelerometer", "gravity", self.gravity, (3,)))
 
     def measure(self, result: Result, *, rate: float, seed: int = 0) -> Result:
         """Readings `a` (N, 3) in m/s2 in its own axes at a rate in Hz, and whether one is `saturated`.

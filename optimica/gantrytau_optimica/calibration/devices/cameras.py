@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, number
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import skewed, turned
 from gantrytau_optimica.calibration.devices.devices import (
@@ -20,7 +22,6 @@ from gantrytau_optimica.calibration.devices.devices import (
     Device,
     MeasuredPoses,
     checked_rotation,
-    numbers,
 )
 from gantrytau_optimica.calibration.devices.sight import Bars, clear
 
@@ -53,23 +54,23 @@ class Camera(Record):
     distortion: Any = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        size = numbers(self.size)
-        if size.shape != (2,) or not np.all(size > 0):
-            raise ModelError(f"Camera: found size={self.size!r}, expected (width, height) in pixels above 0")
+        if not np.all(array("Camera", "size", self.size, (2,)) > 0):
+            raise ModelError(
+                "expected (width, height) in pixels above 0", place="Camera", found=Given("size", self.size)
+            )
         width, height = self.size
-        focal = numbers(self.focal)
-        centre = ((width - 1) / 2, (height - 1) / 2) if self.centre is None else self.centre
-        for name, value, count in (
-            ("r", self.r, 3), ("focal", np.repeat(focal, 2) if focal.ndim == 0 else focal, 2), ("centre", centre, 2),
-            ("distortion", self.distortion, 5),
-        ):  # fmt: skip
-            found = numbers(value)
-            if found.shape != (count,) or not np.all(np.isfinite(found)):
-                raise ModelError(f"Camera: found {name}={value!r}, expected {count} finite numbers")
-            object.__setattr__(self, name, found)
-        if not np.all(self.focal > 0):
-            raise ModelError(f"Camera: found focal={self.focal!r}, expected pixels above 0")
-        object.__setattr__(self, "R", checked_rotation("Camera", self.R))
+        middle = ((width - 1) / 2, (height - 1) / 2)
+        focal = array("Camera", "focal", self.focal, (), (2,))
+        if not np.all(focal > 0):
+            raise ModelError("expected pixels above 0", place="Camera", found=Given("focal", self.focal))
+        for name, value in (
+            ("r", array("Camera", "r", self.r, (3,))),
+            ("R", checked_rotation("Camera", self.R)),
+            ("focal", np.broadcast_to(focal, 2)),
+            ("centre", array("Camera", "centre", middle if self.centre is None else self.centre, (2,))),
+            ("distortion", array("Camera", "distortion", self.distortion, (5,))),
+        ):
+            object.__setattr__(self, name, value)
 
     @property
     def border(self) -> float:
@@ -86,12 +87,14 @@ class Camera(Record):
     @classmethod
     def looking(cls, r: Any, at: Any, *, up: Any = UP, **lens: Any) -> "Camera":
         """A camera at r that looks at a point, the upper edge of its image towards `up`; lens: as of Camera."""
-        r, ahead, up = (np.asarray(a, dtype=float) for a in (r, np.subtract(at, r), up))
+        r, at, up = (array("Camera", n, a, (3,)) for n, a in (("r", r), ("at", at), ("up", up)))
+        ahead = at - r
         right = np.cross(ahead, up)
         if np.linalg.norm(right) < 1e-9 * np.linalg.norm(ahead) * np.linalg.norm(up) or not np.any(ahead):
             raise ModelError(
-                f"Camera: found up={up.tolist()} along the view {ahead.tolist()}, expected another direction; "
-                "name the one that is up in the image"
+                f"along the view {ahead.tolist()}, expected another direction; name the one that is up in the image",
+                place="Camera",
+                found=Given("up", up),
             )
         axes = [right, np.cross(ahead, right), ahead]
         return cls(r, np.column_stack([a / np.linalg.norm(a) for a in axes]), **lens)
@@ -170,24 +173,25 @@ class Cameras(Device):
     smallest: float = 40.0
 
     def __post_init__(self):
+        self._numbers("noise", "smallest", "acceptance", least=0.0)
         for which in ("cameras", "believed"):
             value = getattr(self, which)
             if not isinstance(value, Sequence) or not all(isinstance(c, Camera) for c in value):
-                raise ModelError(f"Cameras: found {which}={value!r}, expected a sequence of Camera")
+                raise ModelError("expected a sequence of Camera", place="Cameras", found=Given(which, value))
         believed = tuple(self.believed) or tuple(self.cameras)
         if not self.cameras or len(believed) != len(self.cameras):
             raise ModelError(
                 f"Cameras: found {len(self.cameras)} cameras and {len(believed)} believed, expected one or more, as many of "
                 "each and in the same order"
             )
-        pattern = squares() if self.pattern is None else np.asarray(self.pattern, dtype=float)
-        if pattern.ndim != 2 or pattern.shape[1] != 3 or len(pattern) < LEAST_POINTS:
+        pattern = array("Cameras", "pattern", squares() if self.pattern is None else self.pattern, (None, 3))
+        flat = len(pattern) and np.linalg.matrix_rank(pattern - pattern.mean(axis=0), tol=1e-6) < 2
+        if len(pattern) < LEAST_POINTS or flat:
             raise ModelError(
-                f"Cameras: found a pattern of shape {pattern.shape}, expected (m, 3) with four points or more"
+                f"expected {LEAST_POINTS} points or more that span a plane",
+                place="Cameras",
+                found=Given("pattern", pattern),
             )
-        if np.linalg.matrix_rank(pattern - pattern.mean(axis=0), tol=1e-6) < 2:
-            raise ModelError("Cameras: found a pattern on one line, expected points that span a plane")
-        self._not_negative("noise", "smallest")
         for name, value in (
             ("believed", believed),
             ("pattern", pattern),
@@ -272,6 +276,7 @@ def single_camera(r: Any, at: Any, *, up: Any = UP, lens_error: float = LENS_ERR
     up: the direction of the upper edge of its image; lens_error: what is left of k1 after the camera was calibrated (see
     `stereo_cameras`); policy: as of Cameras.
     """
+    number("single_camera", "lens_error", lens_error)
     return _with_lens_error([Camera.looking(r, at, up=up)], lens_error, policy)
 
 
@@ -285,10 +290,13 @@ def stereo_cameras(
     2.5 m, which thesis section 5.5 found of its two cameras against a laser tracker (fitted: lenses are not printed).
     policy: as of Cameras.
     """
-    r, at = np.asarray(r, dtype=float), np.asarray(at, dtype=float)
+    number("stereo_cameras", "base", base, least=0.0)
+    number("stereo_cameras", "lens_error", lens_error)
     middle = Camera.looking(r, at, up=up)
     aside = base / 2 * middle.R[:, 0]
-    return _with_lens_error([Camera.looking(r + s * aside, at, up=up) for s in (-1, 1)], lens_error, policy)
+    return _with_lens_error(
+        [Camera.looking(middle.r + s * aside, at, up=up) for s in (-1, 1)], lens_error, policy
+    )
 
 
 def _with_lens_error(believed: list[Camera], lens_error: float, policy: dict[str, Any]) -> Cameras:

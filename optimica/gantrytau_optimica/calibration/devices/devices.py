@@ -7,11 +7,13 @@ is systematic (a scale, a lens), which does not average out however often one me
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, number, one_of
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rotations import skewed, turned
@@ -57,22 +59,20 @@ class Device(Record):
     obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self):
-        self._vector("r", self.r)
-        self._vector("target", self.target)
-        object.__setattr__(self, "R", checked_rotation(type(self).__name__, self.R))
+        kind = type(self).__name__
+        self._vector("r")
+        self._vector("target")
+        object.__setattr__(self, "R", checked_rotation(kind, self.R))
         if not isinstance(self.obstacles, Sequence) or not all(
             hasattr(o, "distance") for o in self.obstacles
         ):
             raise ModelError(
-                f"{type(self).__name__}: found obstacles={self.obstacles!r}, expected a sequence of Box, Cylinder and "
-                "others of gantrytau.kinematics; put a single one in a list"
+                "expected a sequence of Box, Cylinder and others of gantrytau.kinematics; put a single one in a list",
+                place=kind,
+                found=Given("obstacles", self.obstacles),
             )
         if self.facing is not None:
-            facing = self._vector("facing", self.facing)
-            size = float(np.linalg.norm(facing))
-            if not size > 0:
-                raise ModelError(f"{type(self).__name__}: found facing={self.facing!r}, expected a direction")
-            object.__setattr__(self, "facing", facing / size)
+            self._direction("facing")
 
     def sees(self, r: Any, R: Any = None, *, bars: Bars | None = None) -> Array:
         """Which of the poses r (N, 3), R (N, 3, 3) the device sees, (N,); bars: links that may hide the target."""
@@ -86,7 +86,7 @@ class Device(Record):
         R: Any = None,
         seed: int | np.random.Generator = 0,
         *,
-        frame: str = "world",
+        frame: Literal["world", "device"] = "world",
         bars: Bars | None = None,
     ) -> MeasuredPoses:
         """What the device reads of a tool at r (N, 3) in m with orientations R (N, 3, 3), default no rotation.
@@ -95,8 +95,7 @@ class Device(Record):
         the world or the axes of the device, which is what devices deliver. bars: links that may hide the target.
         Raises ModelError for poses of other shapes.
         """
-        if frame not in ("world", "device"):
-            raise ModelError(f"{type(self).__name__}: found frame={frame!r}, expected 'world' or 'device'")
+        one_of(type(self).__name__, "frame", frame, ("world", "device"))
         r, R, _ = self._poses(r, R)
         found = self._read(r, R, np.random.default_rng(seed))
         seen = self._sees(r, R, bars)
@@ -129,35 +128,28 @@ class Device(Record):
         cosine = np.einsum("nk,nk->n", R @ self.facing, back) / np.linalg.norm(back, axis=1)
         return np.arccos(np.clip(cosine, -1.0, 1.0))
 
-    def _vector(self, name: str, value: Any) -> Array:
-        found = numbers(value)
-        if found.shape != (3,) or not np.all(np.isfinite(found)):
-            raise ModelError(f"{type(self).__name__}: found {name}={value!r}, expected three finite numbers")
+    def _numbers(self, *names: str, least: float | None = None, above: float | None = None) -> None:
+        """ModelError for arguments that are no finite numbers within limits."""
+        for name in names:
+            number(type(self).__name__, name, getattr(self, name), least=least, above=above)
+
+    def _vector(self, name: str) -> Array:
+        found = array(type(self).__name__, name, getattr(self, name), (3,))
         object.__setattr__(self, name, found)
         return found
 
-    def _not_negative(self, *names: str, remedy: str = "; 0 leaves this error out") -> None:
-        for name in names:
-            found = numbers(value := getattr(self, name))
-            if found.shape != () or not (np.isfinite(found) and found >= 0):
-                raise ModelError(
-                    f"{type(self).__name__}: found {name}={value!r}, expected a number that is not negative{remedy}"
-                )
+    def _direction(self, name: str) -> None:
+        """Make a vector one of length 1; ModelError for one without a direction."""
+        size = float(np.linalg.norm(found := self._vector(name)))
+        if not size > 0:
+            raise ModelError("expected a direction", place=type(self).__name__, found=Given(name, found))
+        object.__setattr__(self, name, found / size)
 
-    def _relative(self, name: str, *shapes: tuple[int, ...]) -> None:
-        """Check a relative error: a number, or an array of one of the shapes."""
-        found = numbers(value := getattr(self, name))
-        if found.shape not in ((), *shapes) or not np.all(np.isfinite(found)):
-            many = "".join(f", or an array of shape {shape}" for shape in shapes)
-            raise ModelError(f"{type(self).__name__}: found {name}={value!r}, expected a finite number{many}")
-
-    def _range(self, name: str, value: Any, unit: str) -> None:
-        """Check two limits; the upper one may be infinite."""
-        found = numbers(value)
-        if found.shape != (2,) or not found[0] < found[1]:
-            raise ModelError(
-                f"{type(self).__name__}: found {name}={value!r}, expected (least, largest) in {unit}"
-            )
+    def _range(self, name: str) -> None:
+        """ModelError unless an argument is (least, largest)."""
+        found = array(type(self).__name__, name, getattr(self, name), (2,), finite=False)
+        if not found[0] < found[1]:
+            raise ModelError("expected (least, largest)", place=type(self).__name__, found=Given(name, found))
 
     def _poses(self, r: Any, R: Any) -> tuple[Array, Array, bool]:
         found = poses(r, np.eye(3) if R is None else R, type(self).__name__)
@@ -190,14 +182,12 @@ class LaserTracker(Device):
     acceptance: float = np.radians(30.0)
 
     def __post_init__(self):
+        self._numbers("range_noise", "range_noise_per_metre", "transverse_noise", least=0.0)
+        self._numbers("transverse_noise_per_metre", "nearest", "acceptance", least=0.0)
+        self._numbers("scale")
+        self._numbers("farthest", above=self.nearest)
+        self._range("elevation")
         super().__post_init__()
-        self._not_negative(
-            "range_noise", "range_noise_per_metre", "transverse_noise", "transverse_noise_per_metre"
-        )
-        self._relative("scale")
-        self._range("(nearest, farthest)", (self.nearest, self.farthest), "m")
-        self._range("elevation", self.elevation, "rad")
-        self._not_negative("acceptance", remedy=" in rad")
 
     def covariance(self, r: Any, R: Any = None) -> Array:
         """Covariance of the measured position in the world at poses r (N, 3), R (N, 3, 3), (N, 3, 3) in m2."""
@@ -254,8 +244,8 @@ class TMac(LaserTracker):
     nearest: float = 1.5
 
     def __post_init__(self):
+        self._numbers("rotation_noise", least=0.0)
         super().__post_init__()
-        self._not_negative("rotation_noise")
 
     def covariance(self, r: Any, R: Any = None) -> Array:
         """Covariance of position (m) and rotation vector (rad) in the world, (N, 6, 6)."""
@@ -309,14 +299,11 @@ def _like(seen: Array, values: Array) -> Array:
 
 def checked_rotation(what: str, R: Any) -> Array:
     """An orientation, (3, 3); ModelError if it is none."""
-    found = numbers(R)
-    if (
-        found.shape != (3, 3)
-        or not np.allclose(found @ found.T, np.eye(3), atol=ORTHONORMAL)
-        or np.linalg.det(found) < 0
-    ):
-        shown = found.round(6).tolist() if found.ndim else repr(R)
+    found = array(what, "R", R, (3, 3))
+    if not np.allclose(found @ found.T, np.eye(3), atol=ORTHONORMAL) or np.linalg.det(found) < 0:
         raise ModelError(
-            f"{what}: found R={shown}, expected a rotation matrix (3, 3), its columns the axes of the device in the world"
+            "expected a rotation matrix, its columns the axes of the device in the world",
+            place=what,
+            found=Given("R", found.round(6)),
         )
     return found

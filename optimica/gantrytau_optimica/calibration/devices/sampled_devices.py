@@ -1,4 +1,4 @@
-"""Devices that watch a motion: what they read at their own rate, and what a predictor makes of late readings."""
+"""Devices that watch a motion: what they read at their own rate."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import KW_ONLY, dataclass, replace
@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import number
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.devices import Array, Device
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
-from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
 
 ROUNDING = 1e-9  # of a sample: a last instant that rounding puts behind the end is still read
 BENT = 1e-2  # of their length, by which axes are too short halfway between two rotations 16 degrees apart
@@ -23,8 +25,7 @@ def instants(result: Result, rate: float) -> Array:
     A rate that does not divide the duration leaves an unread rest. ModelError for a rate that is not above zero, and for
     a result whose outputs lie farther apart than two readings: straight lines between them are not what moved.
     """
-    if not (np.isfinite(rate) and rate > 0):
-        raise ModelError(f"measure: found rate={rate!r}, expected a number above 0 in Hz, such as 1000.0")
+    number("measure", "rate", rate, above=0.0)
     first, last = result.time[[0, -1]]
     apart = float(np.max(np.diff(result.time), initial=0.0))
     if apart * rate > 1 + EVEN:
@@ -61,14 +62,12 @@ class SampledDevice(Record):
     play: float = 0.0
 
     def __post_init__(self):
-        if not (np.isfinite(self.play) and self.play >= 0):
-            raise ModelError(
-                f"SampledDevice: found play={self.play!r}, expected a number that is not negative, in m"
-            )
+        number("SampledDevice", "play", self.play, least=0.0)
         if self.play and not isinstance(self.device, LengthGauge):
             raise ModelError(
-                f"SampledDevice: found play={self.play!r} and a {type(self.device).__name__}, expected a LengthGauge; "
-                "nothing else touches what it measures"
+                f"expected a LengthGauge, not a {type(self.device).__name__}; nothing else touches what it measures",
+                place="SampledDevice",
+                found=Given("play", self.play),
             )
 
     def measure(self, result: Result, *, rate: float, seed: int = 0) -> Readings:
@@ -110,7 +109,9 @@ class SampledDevice(Record):
         R = np.asarray(result.at(t, name))
         if R.shape != (len(t), 3, 3):
             raise ModelError(
-                f"SampledDevice: found orientation={name!r} of shape {R.shape[1:]}, expected a matrix (3, 3)"
+                f"of shape {R.shape[1:]}, expected a matrix (3, 3)",
+                place="SampledDevice",
+                found=Given("orientation", name),
             )
         # straight lines between two rotations leave them by the square of the turn: the nearest rotation
         U, sizes, Vt = np.linalg.svd(R)
@@ -138,38 +139,8 @@ class SampledDevice(Record):
             yield Finding(
                 "lost",
                 lost,
-                f"{rows_in_words(lost)} of {len(t)} {have} not seen by the {name} at [{place}] m: {where}",
+                (Rows(lost), f" of {len(t)} {have} not seen by the {name} at [{place}] m: {where}"),
             )
-
-
-def predict_late(readings: Result, name: str, *, latency: float, degree: int = 1) -> Array:
-    """What a predictor says of a scalar now, as readings come late by a latency in s: (N,), NaN at the beginning.
-
-    The polynomial of this degree through the last readings that have arrived is continued: 0 holds, 1 goes on with
-    constant speed. A motion with acceleration a is missed by a h2 d (d + 1) / 2 at degree 1, with h s between readings
-    and d readings under way. Raises ModelError for fewer readings than the first prediction needs, or uneven times.
-    """
-    t, x = readings.time, readings[name]
-    if not (np.isfinite(latency) and latency >= 0) or degree not in (0, 1, 2):
-        raise ModelError(
-            f"predict_late: found latency={latency!r}, degree={degree!r}, expected a latency in s that is not negative "
-            "and a degree of 0, 1 or 2"
-        )
-    h = (t[-1] - t[0]) / max(len(t) - 1, 1)
-    if np.any(np.abs(np.diff(t) - h) > 1e-6 * h):
-        raise ModelError("predict_late: found uneven times, expected readings at one rate, as of `measure`")
-    late = int(np.ceil(latency / h - ROUNDING)) if h else 0
-    if len(t) <= late + degree:
-        raise ModelError(
-            f"predict_late: found {len(t)} readings, expected more than {late + degree} for a latency of {latency:g} s"
-        )
-    # Lagrange's polynomials through the nodes 0, -1, ... of the arrived readings, at `late` steps ahead
-    nodes = -np.arange(degree + 1.0)
-    weights = [np.prod([(late - b) / (a - b) for b in nodes if b != a]) if degree else 1.0 for a in nodes]
-    told = np.full(len(t), np.nan)
-    first = late + degree
-    told[first:] = sum(w * x[first - late - k : len(t) - late - k] for k, w in enumerate(weights))
-    return told
 
 
 def _played(x: Array, play: float) -> Array:

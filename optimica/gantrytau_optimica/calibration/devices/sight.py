@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array, instance, number
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.workspace.obstacles import Obstacle, between_segments, segment_distance
 
@@ -26,18 +27,14 @@ class Bars(Record):
     radius: float
 
     def __post_init__(self):
-        try:
-            start, end = np.asarray(self.start, dtype=float), np.asarray(self.end, dtype=float)
-        except (TypeError, ValueError):
+        number("Bars", "radius", self.radius, above=0.0)
+        start, end = (
+            array("Bars", name, getattr(self, name), (None, None, 3), (None, 3)) for name in ("start", "end")
+        )
+        if start.shape != end.shape:
             raise ModelError(
-                f"Bars: found ends {self.start!r} and {self.end!r}, expected arrays of numbers"
-            ) from None
-        if start.shape != end.shape or start.ndim not in (2, 3) or start.shape[-1] != 3:
-            raise ModelError(
-                f"Bars: found ends of shapes {start.shape} and {end.shape}, expected (N, k, 3) for both, or (k, 3)"
+                f"Bars: found start of shape {start.shape} and end of {end.shape}, expected the same for both"
             )
-        if not self.radius > 0:
-            raise ModelError(f"Bars: found radius={self.radius!r}, expected a length above 0 in m")
         object.__setattr__(self, "start", start if start.ndim == 3 else start[None])
         object.__setattr__(self, "end", end if end.ndim == 3 else end[None])
 
@@ -63,9 +60,7 @@ def clear(eye: Array, points: Array, obstacles: Sequence[Obstacle], bars: Bars |
     """Whether nothing stands between eye (3,) and each of points (N, 3), both in m in the world, (N,)."""
     free = np.ones(len(points), dtype=bool)
     if bars is not None:
-        if not isinstance(bars, Bars):
-            raise ModelError(f"bars: found {type(bars).__name__}, expected Bars(start, end, radius)")
-        free &= ~bars.hide(eye, points)
+        free &= ~instance("sees", "bars", bars, Bars).hide(eye, points)
     for obstacle in obstacles:
         free &= segment_distance(obstacle, np.broadcast_to(eye, points.shape), points) > 0
     return free

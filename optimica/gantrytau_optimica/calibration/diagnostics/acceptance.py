@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from gantrytau.border.refusal import Given
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.data.row_sets import rows_of
-from gantrytau_optimica.calibration.diagnostics.causes import ordered, pulled, scaled
+from gantrytau_optimica.calibration.diagnostics.causes import over_rows, pulled, scaled
 from gantrytau_optimica.calibration.diagnostics.device_frames import frame_of, moved_arms
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.diagnostics.fitted_rods import FittedRods
@@ -24,7 +25,7 @@ from gantrytau_optimica.calibration.diagnostics.plausibility import (
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.links.error_models import ModelLink, links_of_arms, moved
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
-from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Part, Rows, agreeing
 
 HOPELESS = ("too few poses", "line", "plane", "millimetres", "rotations", "guideway")
 LEFT_OUT = ("nan", "duplicates", "stuck")
@@ -39,9 +40,7 @@ def usable_rows(findings: Sequence[Finding], measurements: Measurements) -> np.n
     good = np.ones(len(measurements), dtype=bool)
     for finding in findings:
         if finding.kind in HOPELESS:
-            raise CalibrationError(
-                f"Measurements: {finding.message}", kind=finding.kind, rows=finding.rows, findings=findings
-            )
+            raise refusal(finding.kind, finding.rows, *finding.parts, findings=findings)
         if finding.kind in LEFT_OUT:
             good[finding.rows] = False
     return np.flatnonzero(good)
@@ -52,11 +51,13 @@ def check_carts(robot: NominalRods, measurements: Measurements, rows: np.ndarray
     for k in range(len(robot.arms)):
         q = measurements.q[rows, k]
         if len(rows) and q.max() - q.min() < STILL:
-            raise CalibrationError(
-                f"Measurements: found q{k + 1} at {q[0]:.6g} m in {rows_in_words(rows)}, expected a cart that moves; its "
-                "guideway cannot be identified from these; look at that column, or measure other poses",
-                kind="constant",
-                rows=rows,
+            raise refusal(
+                "constant",
+                rows,
+                f"found q{k + 1} at {q[0]:.6g} m in ",
+                Rows(rows),
+                ", expected a cart that moves; its guideway cannot be identified from these; look at that column, or "
+                "measure other poses",
             )
 
 
@@ -64,11 +65,12 @@ def check_count(parameters: int, rows: np.ndarray, findings: Sequence[Finding]) 
     """CalibrationError for fewer fitted rows than a link has parameters and one more."""
     needed = parameters + 1
     if len(rows) < needed:
-        raise CalibrationError(
-            f"Measurements: found {len(rows)} poses to fit {parameters} parameters of each link, expected {needed} at the "
-            "least; measure more poses, or give holdout=None",
-            kind="too few poses",
-            rows=rows,
+        raise refusal(
+            "too few poses",
+            rows,
+            f"found {len(rows)} poses to fit {parameters} parameters of each link, expected {needed} at the least; measure "
+            "more poses, or give ",
+            Given("holdout", None),
             findings=findings,
         )
 
@@ -83,34 +85,38 @@ def in_frame(
         return links, None
     fitting = compare(links, data.q, data.r, data.R)
     if fitting.left > NEAR / 10:
-        raise CalibrationError(
-            f"Measurements: found no links of constant length that fit {rows_in_words(rows)} (they miss it by "
-            f"{fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, of a robot with "
-            "linear guideways",
-            kind="another robot",
-            rows=rows,
+        raise refusal(
+            "another robot",
+            rows,
+            "found no links of constant length that fit ",
+            Rows(rows),
+            f" (they miss it by {fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, "
+            "of a robot with linear guideways",
         )
     if (
         fitting.off > NEAR
-    ):  # places on two levels of x, y or z do not tell guideways apart; forward kinematics may
+    ):  # places on two levels of an axis do not tell guideways apart; forward kinematics may
         by_tool = frame_of(robot.robot, misses_of(links), data)
         fitting = fitting if by_tool is None or by_tool.off > NEAR else by_tool
     if fitting.off > NEAR and (swapped := swapped_carts(links, fitting.off, data.q, data.r, data.R)):
         words, off = swapped
-        raise CalibrationError(
-            f"Measurements: found {words} in {rows_in_words(rows)} (guideways lie {fitting.off:.3g} m off those of "
-            f"{robot.name} however the frame is placed, {off:.3g} m with that undone); correct the columns of the "
-            "measurements",
-            kind="swapped columns" if "column" in words else "sign",
-            rows=rows,
+        raise refusal(
+            "swapped columns" if "column" in words else "sign",
+            rows,
+            f"found {words} in ",
+            Rows(rows),
+            f" (guideways lie {fitting.off:.3g} m off those of {robot.name} however the frame is placed, {off:.3g} m with "
+            "that undone); correct the columns of the measurements",
         )
     if fitting.off > NEAR:
-        raise CalibrationError(
-            f"Measurements: found guideways that lie {fitting.off:.3g} m off those of {robot.name} however the "
-            f"frame is placed, in {rows_in_words(rows)}, expected {NEAR:g} m at most; these are measurements of another "
-            "robot, or its nominal values are wrong: start='linear' needs none",
-            kind="another robot",
-            rows=rows,
+        raise refusal(
+            "another robot",
+            rows,
+            f"found guideways that lie {fitting.off:.3g} m off those of {robot.name} however the frame is placed, in ",
+            Rows(rows),
+            f", expected {NEAR:g} m at most; these are measurements of another robot, or its nominal values are wrong: ",
+            Given("start", "linear"),
+            " needs none",
         )
     return moved(links, fitting.turn, fitting.shift), fitting
 
@@ -138,25 +144,31 @@ def arms_in_frame(
         if left < NEAR:
             return there, fitting
         missed = min(missed, left)
-    raise CalibrationError(
-        f"Measurements: found {rows_in_words(rows)} in which links miss their nominal lengths by {missed:.3g} m in the "
-        f"median however the frame is placed, expected {NEAR:g} m at most; these are measurements of another robot, or its "
-        "nominal values are wrong",
-        kind="another robot",
-        rows=rows,
+    raise refusal(
+        "another robot",
+        rows,
+        "found ",
+        Rows(rows),
+        f" in which links miss their nominal lengths by {missed:.3g} m in the median however the frame is placed, expected "
+        f"{NEAR:g} m at most; these are measurements of another robot, or its nominal values are wrong",
     )
 
 
-def in_words(fitting: Fitting, rows: np.ndarray) -> Finding:
+def refusal(kind: str, rows: np.ndarray, *parts: Part, findings: Sequence[Finding] = ()) -> CalibrationError:
+    """The error for measurements that cannot be used."""
+    return CalibrationError(*parts, kind=kind, rows=rows, findings=findings, place="Measurements")
+
+
+def other_frame(fitting: Fitting, rows: np.ndarray) -> Finding:
     """The finding that the frame is another."""
     words = (
-        f"the frame of {rows_in_words(rows)} is another than that of the nominal values ({_told(fitting)}); identified in "
-        "the frame measured, from nominal values moved there"
+        f" is another than that of the nominal values ({_described(fitting)}); identified in the frame measured, from "
+        "nominal values moved there"
     )
-    return Finding("frame", rows, words)
+    return Finding("frame", rows, ("the frame of ", Rows(rows), words))
 
 
-def _told(fitting: Fitting) -> str:
+def _described(fitting: Fitting) -> str:
     angle = np.degrees(np.arccos(np.clip((np.trace(fitting.turn) - 1) / 2, -1.0, 1.0)))
     x, y, z = fitting.shift
     return (
@@ -167,11 +179,14 @@ def _told(fitting: Fitting) -> str:
 
 def not_in_base(robot: NominalRods, fitting: Fitting, rows: np.ndarray) -> CalibrationError:
     """The refusal of measurements in another frame than the base in which they are said to be."""
-    return CalibrationError(
-        f"Measurements: found {rows_in_words(rows)} in another frame than the base of {robot.name} ({_told(fitting)}), "
-        "expected poses where the robot is commanded; move them there, or take frame='fitted'",
-        kind="frame",
-        rows=rows,
+    return refusal(
+        "frame",
+        rows,
+        "found ",
+        Rows(rows),
+        f" in another frame than the base of {robot.name} ({_described(fitting)}), expected poses where the robot is "
+        "commanded; move them there, or take ",
+        Given("frame", "fitted"),
     )
 
 
@@ -186,7 +201,7 @@ def judged(found: FittedRods) -> list[Finding]:
     others = rows_of(seen.rows, without=rows_of(*(f.rows for f in findings)))
     findings += outliers(found, others, f"close worse than {OUTLIER:g} standard deviations")
     others = found.without_strays()
-    findings += ordered(others)
+    findings += over_rows(others)
     return [
         *findings,
         *_misfit(found, seen, findings),
@@ -211,13 +226,13 @@ def outliers(found: FittedNumbers, rows: np.ndarray, said: str) -> Iterator[Find
     if not rows.size:
         return
     one, (verb, *words) = len(rows) == 1, said.split()
-    advice = f"look at {'it' if one else 'them'}, or take loss='robust'"
+    advice: tuple[Part, ...] = (f"look at {'it' if one else 'them'}, or take ", Given("loss", "robust"))
     if found.loss == "robust":
         advice = (
-            f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error"
+            f"{'it' if one else 'they'} had little weight and {'is' if one else 'are'} left out of the error",
         )
-    where = rows_in_words(rows, len(found.measurements))
-    yield Finding("outliers", rows, f"{where} {agreeing(rows, verb)} {' '.join(words)}; {advice}")
+    where = Rows(rows, len(found.measurements))
+    yield Finding("outliers", rows, (where, f" {agreeing(rows, verb)} {' '.join(words)}; ", *advice))
 
 
 def not_converged(found: FittedNumbers) -> Iterator[Finding]:
@@ -253,27 +268,26 @@ def _misfit(found: FittedRods, seen: Suspicion, findings: list[Finding]) -> Iter
     if seen.typical < MISFIT:
         return
     rows = rows_of(found.rows, found.held_out)
-    where = rows_in_words(rows, len(found.measurements))
-    words = f"links miss their lengths by {seen.typical * 1e3:.3g} mm in {where} with the best parameters"
-    remedy = (
-        "q, r and R of the same pose in each row; look at order, units and signs of columns, or take loss='robust' where "
-        "many rows are wrong, or a device that errs by less"
+    said: tuple[Part, ...] = (
+        f"links miss their lengths by {seen.typical * 1e3:.3g} mm in ",
+        Rows(rows, len(found.measurements)),
+        " with the best parameters",
+    )
+    remedy: tuple[Part, ...] = (
+        " expected q, r and R of the same pose in each row; look at order, units and signs of columns, or take ",
+        Given("loss", "robust"),
+        " where many rows are wrong, or a device that errs by less",
     )
     if seen.typical > REFUSED:
-        raise CalibrationError(
-            f"Measurements: found that {words}, expected {remedy}",
-            kind="misfit",
-            rows=rows,
-            findings=findings,
-        )
-    yield Finding("misfit", rows, f"{words}; expected {remedy}")
+        raise refusal("misfit", rows, "found that ", *said, ",", *remedy, findings=findings)
+    yield Finding("misfit", rows, (*said, ";", *remedy))
 
 
 def _in_doubt(found: FittedRods) -> Iterator[Finding]:
     lost = found.held_out[~np.isfinite(found.errors)]
     if lost.size:
         left = f"{agreeing(lost, 'they are')} left out of the error"
-        words = f"links of the calibrated robot do not meet at q of {rows_in_words(lost)}; {left}"
+        words = ("links of the calibrated robot do not meet at q of ", Rows(lost), f"; {left}")
         yield Finding("no pose", lost, words)
 
 
@@ -306,23 +320,17 @@ def _mistaken(found: FittedRods, seen: Suspicion) -> list[Finding]:
         return []
     R = None if data.R is None else data.R[rows]
     limit = max(EXPLAINED, OUTLIER * seen.typical)
-    findings = [
-        Finding(
-            mistake.kind,
-            rows[places],
-            f"{mistake.words} in {rows_in_words(rows[places])}; correct {'this row' if len(places) == 1 else 'these rows'}",
+    findings = []
+    for mistake, indices in explained_rows(
+        found.nominal_rods, seen.misses, limit, data.q[rows], data.r[rows], R
+    ):
+        advice = f"; correct {'this row' if len(indices) == 1 else 'these rows'}"
+        findings.append(
+            Finding(mistake.kind, rows[indices], (f"{mistake.words} in ", Rows(rows[indices]), advice))
         )
-        for mistake, places in explained_rows(
-            found.nominal_rods, seen.misses, limit, data.q[rows], data.r[rows], R
-        )
-    ]
     if findings and found.loss != "robust":
-        words = "; ".join(f.message for f in findings)
-        bad = np.sort(np.concatenate([f.rows for f in findings]))
-        raise CalibrationError(
-            f"Measurements: found {words}, or take loss='robust'",
-            kind=findings[0].kind,
-            rows=bad,
-            findings=findings,
-        )
+        words = [part for finding in findings for part in ("; ", *finding.parts)][1:]
+        bad = np.sort(np.concatenate([finding.rows for finding in findings]))
+        last = (", or take ", Given("loss", "robust"))
+        raise refusal(findings[0].kind, bad, "found ", *words, *last, findings=findings)
     return findings

@@ -7,81 +7,61 @@ import numpy as np
 from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.diagnostics.constraint_tension import pulls
 from gantrytau_optimica.calibration.diagnostics.fitted_rods import FittedRods
-from gantrytau_optimica.calibration.diagnostics.order_effects import OrderEffect, order_effect
 from gantrytau_optimica.calibration.diagnostics.outliers import OUTLIER
-from gantrytau_optimica.calibration.diagnostics.slips import Slip, slip, smooth_functions
-from gantrytau_optimica.fitting.finding import Finding, rows_in_words
+from gantrytau_optimica.calibration.diagnostics.row_effects import RowEffect, row_effects
+from gantrytau_optimica.fitting.finding import Finding, Rows, length_text
 
 SHOWN = 3  # priors or constraints that are named
 UNIT = 1e-9  # by which a direction of length 1 may be rounded
 ALIKE = 4.0  # deviations by which scales of guideways may differ and be one
 LOOKED_AT = 1000  # poses, in which a slip or a drift is looked for
+ADVICE = {
+    "drift": "the device or the robot warmed up, settled or gave way; wait until they stand, and measure again, the first "
+    "poses once more at the end",
+    "jump": "the device or the robot was moved; calibrate the parts apart, or measure again",
+    "period": "look how they were measured or written down, and leave them out, or measure again",
+    "slip": "the encoder slipped or was referenced anew, or the robot or the device was moved; calibrate the parts apart, "
+    "or measure again",
+}
+ALIKE_ORDER = (
+    "; as rows follow the places of the tool, an error of the model may look the same: a mixed order tells"
+)
 ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
 
-def ordered(found: FittedRods) -> Iterator[Finding]:
+def over_rows(found: FittedRods) -> Iterator[Finding]:
     """What changed from one row on, with the order of the rows, or from row to row."""
-    if (
-        found.measurements.shared is not None
-    ):  # errors that poses have in common follow the order of their places
+    if found.measurements.shared is not None:  # such errors follow the order of the places
         return
     used, systems = found.systems(LOOKED_AT)
-    r, fitted = found.measurements.r[used], np.flatnonzero(np.isin(used, found.rows))
-    smooth = smooth_functions(r[fitted])
-    slips = []
-    for one in (each.of(fitted) for each in systems):
-        for column, slopes in one.actuators.items():
-            if (seen := slip(one, slopes, smooth)) is not None:
-                last = fitted[seen.last] if seen.last < len(fitted) else len(used)
-                slips.append((column, Slip(int(fitted[seen.first]), int(last), seen.size)))
     rows = rows_of(found.rows, found.held_out, without=found.left_out)
-    if (effect := order_effect(systems, r, used, slips)) is not None:
-        yield _by_order(found, effect, rows, used)
-        return
-    for column, seen in slips:
-        last = used[seen.last] if seen.last < len(used) else len(found.measurements)
-        off = rows[(rows >= used[seen.first]) & (rows < last)]
-        words = (
-            f"q{column + 1} is off by {_size(found, column, seen.size)} in {rows_in_words(off, len(found.measurements))}, "
-            "beside the other rows; the encoder slipped or was referenced anew, or the robot or the device was moved; "
-            "calibrate the parts apart, or measure again"
-        )
-        yield Finding("slip", off, words)
+    for effect in row_effects(systems, found.measurements.r[used], used):
+        off = effect.rows
+        first, last = used[off[0]], used[off[-1] + 1] if off[-1] + 1 < len(used) else len(found.measurements)
+        if effect.kind == "period":
+            here = rows[(rows - first) % effect.period == 0]
+        else:
+            here = rows[(rows >= first) & (rows < last)]
+        yield _of_rows(found, effect, here)
 
 
-def _size(found: FittedRods, column: int, size: float) -> str:
-    """How far an actuator is off."""
-    return f"{size * 1e3:+.3g} {'mm' if column < len(found.nominal_rods.arms) else 'mrad'}"
-
-
-def _by_order(found: FittedRods, effect: OrderEffect, rows: np.ndarray, used: np.ndarray) -> Finding:
-    """rows: all that take part; used: those in which the effect was seen."""
-    first, kind = used[effect.rows[0]], "drift"
-    if effect.kind == "jump":
-        rows, kind = rows[rows >= first], "jump"
-    elif effect.kind == "period":
-        rows, kind = rows[(rows - first) % effect.period == 0], "period"
-    where = rows_in_words(rows, len(found.measurements))
-    unit = "mrad" if effect.kind == "turn" else "mm"
+def _of_rows(found: FittedRods, effect: RowEffect, rows: np.ndarray) -> Finding:
+    """The finding on an effect in some rows, of all that take part."""
+    angle = effect.kind == "turn" or (effect.column >= len(found.nominal_rods.arms))
+    unit, where = "mrad" if angle else "mm", Rows(rows, len(found.measurements))
+    off = f"{effect.change[0] * 1e3:+.3g} {unit}"  # of an actuator
     size = f"{effect.size * 1e3:.3g} {unit} ({', '.join(f'{x * 1e3:+.3g}' for x in effect.change)} {unit})"
     every = f"every {ORDINALS[effect.period]} row, " if effect.period else ""
-    said = {
-        "position": f"positions drift by {size} from the first of {where} to the last",
-        "turn": f"the frame of positions turns by {size} from the first of {where} to the last",
-        "actuator": f"q{effect.column + 1} drifts by {_size(found, effect.column, float(effect.change[0]))} from the first "
-        f"of {where} to the last",
-        "jump": f"positions lie off by {size} in {where}, beside the other rows",
-        "period": f"positions lie off by {size} in {every}{where}, beside the other rows",
+    kind, before, after = {
+        "position": ("drift", f"positions drift by {size} from the first of ", " to the last"),
+        "turn": ("drift", f"the frame of positions turns by {size} from the first of ", " to the last"),
+        "actuator": ("drift", f"q{effect.column + 1} drifts by {off} from the first of ", " to the last"),
+        "jump": ("jump", f"positions lie off by {size} in ", ", beside the other rows"),
+        "period": ("period", f"positions lie off by {size} in {every}", ", beside the other rows"),
+        "slip": ("slip", f"q{effect.column + 1} is off by {off} in ", ", beside the other rows"),
     }[effect.kind]
-    advice = {
-        "drift": "the device or the robot warmed up, settled or gave way; wait until they stand, and measure again, the "
-        "first poses once more at the end",
-        "jump": "the device or the robot was moved; calibrate the parts apart, or measure again",
-        "period": "look how they were measured or written down, and leave them out, or measure again",
-    }[kind]
-    alike = "; as rows follow the places of the tool, an error of the model may look the same: a mixed order tells"
-    left = f"without it {np.sqrt(effect.variance) * 1e6:.3g} um are left of the links"
-    return Finding(kind, rows, f"{said}; {left}; {advice}{alike if effect.alike else ''}")
+    left = f"; without it {length_text(np.sqrt(effect.variance))} are left of the links; {ADVICE[kind]}"
+    return Finding(kind, rows, (before, where, after, left, ALIKE_ORDER if effect.alike else ""))
 
 
 def pulled(found: FittedRods) -> Iterator[Finding]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, ParameterConstraint
-from gantrytau_optimica.calibration.fitting.least_squares import problem
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 
 LEAST = 1e-9  # m2 or m, of the noise: rounding of closure errors is far below it
@@ -65,8 +64,8 @@ def pulls(fit: Fit, constraints: Sequence[ParameterConstraint] = ()) -> list[Pul
 def _by_data_alone(fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     """The step of the free numbers to where data want them, (n,), by tape where they want nothing, and its covariance."""
     group, free = fit.group, fit.group.free
-    data = problem(group, fit.weights)  # rows of the prior are zero
-    e, J = data.errors(fit.x), data.slopes(fit.x)[:, free]
+    data = group.condensed(fit.weights)
+    e, J = data.residuals(fit.x), (data.jacobian(fit.x) * group.scale)[:, free]
     rest = e - J @ np.linalg.lstsq(J, e, rcond=1e-10)[0]
     s = max(float(np.sqrt(rest @ rest / max(1, fit.count - fit.minimum.rank))), LEAST)
     away = (fit.x - group.x)[free] / group.scale[free]

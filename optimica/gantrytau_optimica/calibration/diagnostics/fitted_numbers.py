@@ -12,10 +12,10 @@ from gantrytau import ModelError
 from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.links.error_models import shared_name
 from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.least_squares import Minimum
 
 REMEDIES = {
     "trend": "a parameter that is not named, a bent guideway, an eccentric axis or a gear; name more parameters",

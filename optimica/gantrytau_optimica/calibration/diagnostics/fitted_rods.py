@@ -13,17 +13,11 @@ from gantrytau_optimica.calibration.data.row_sets import rows_of
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
 from gantrytau_optimica.calibration.diagnostics.link_systems import LinkSystem, closure_series, link_systems
-from gantrytau_optimica.calibration.diagnostics.order_effects import ENDS
 from gantrytau_optimica.calibration.diagnostics.outliers import Suspicion, suspicion
 from gantrytau_optimica.calibration.diagnostics.plausibility import Misses
+from gantrytau_optimica.calibration.diagnostics.row_effects import ENDS
 from gantrytau_optimica.calibration.fitting.constraints import ParameterConstraint
-from gantrytau_optimica.calibration.fitting.covariance import (
-    as_told,
-    joint_covariance,
-    link_noise,
-    undetermined,
-)
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
+from gantrytau_optimica.calibration.fitting.covariance import as_told, joint_covariance, link_noise
 from gantrytau_optimica.calibration.fitting.named_parameters import (
     Named,
     calibrated_arms,
@@ -32,10 +26,11 @@ from gantrytau_optimica.calibration.fitting.named_parameters import (
 )
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
-from gantrytau_optimica.calibration.links.arm_kinematics import ArmKinematics
+from gantrytau_optimica.calibration.links.arm_poses import ArmKinematics
 from gantrytau_optimica.calibration.links.forward import CalibratedKinematics
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
+from gantrytau_optimica.fitting.least_squares import Minimum
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,9 +103,8 @@ class FittedRods(FittedNumbers):
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        return tuple(
-            name for fit in self.fits for name in undetermined(fit.minimum, fit.free_names, as_told(fit))
-        )
+        lost = [fit.minimum.undetermined(fit.free_names, as_told(fit)) for fit in self.fits]
+        return tuple(name for names in lost for name in names)
 
     @property
     def minima(self) -> tuple[Minimum, ...]:

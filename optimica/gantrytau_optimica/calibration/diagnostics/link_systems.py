@@ -9,6 +9,7 @@ group has its own J; a cause may move the links of all of them.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -17,6 +18,10 @@ from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.covariance import pose_noise
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
+
+SMOOTHER = (
+    2.0  # times the variance that a cause leaves, which smooth functions of the pose must leave at the least
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +55,9 @@ class LinkSystem(Record):
         flat = columns.reshape(self.errors.size, -1)
         return (flat - self.known @ (self.known.T @ flat)).reshape(columns.shape)
 
-    def beside(self, columns: np.ndarray) -> "LinkSystem":
-        """The same where further columns (N, m, k), without certainty, explain errors as numbers do."""
-        columns = columns * self.certainty[..., None]
+    def with_columns(self, columns: np.ndarray) -> "LinkSystem":
+        """The same where further columns (N, m, k) explain errors as numbers do."""
         return replace(self, numbers=np.concatenate([self.numbers, columns], axis=2))
-
-    def of(self, rows: np.ndarray) -> "LinkSystem":
-        """The same at some of the poses."""
-        actuators = {column: slopes[rows] for column, slopes in self.actuators.items()}
-        errors, numbers, place, turn = (
-            array[rows] for array in (self.errors, self.numbers, self.place, self.turn)
-        )
-        return LinkSystem(errors, numbers, place, turn, actuators, self.certainty[rows])
 
 
 def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
@@ -70,7 +66,7 @@ def link_systems(fits: Sequence[Fit], data: Measurements) -> list[LinkSystem]:
     for fit in fits:
         here = fit.group.over(data.q, data.r, data.R)
         every = replace(here, free=np.ones_like(here.free))
-        numbers = np.stack([every.slopes(fit.x, k) for k in range(len(here.chains))], axis=1)
+        numbers = np.stack([every.link_jacobian(fit.x, k) for k in range(len(here.chains))], axis=1)
         if fit.minimum.rank < here.free.sum():  # what data do not hold explains nothing
             held = np.zeros((fit.minimum.rank, len(fit.x)))
             held[:, here.free] = fit.minimum.directions[: fit.minimum.rank] * here.scale[here.free]
@@ -98,6 +94,21 @@ def freedom(systems: Sequence[LinkSystem]) -> int:
 def variance(systems: Sequence[LinkSystem]) -> float:
     """Of a closure error that numbers leave, m2."""
     return sum(float(np.sum(one.left**2)) for one in systems) / max(1, freedom(systems))
+
+
+def with_smooth(systems: Sequence[LinkSystem], r: np.ndarray) -> list[LinkSystem]:
+    """The same where polynomials of the third degree in r (N, 3) explain errors of each link too, as errors of the model."""
+    x = 2 * (r - r.min(axis=0)) / np.maximum(np.ptp(r, axis=0), 1e-300) - 1
+    x = np.column_stack([np.ones(len(x)), x])
+    smooth = np.column_stack(
+        [x[:, i] * x[:, j] * x[:, k] for i, j, k in combinations_with_replacement(range(4), 3)]
+    )
+    found = []
+    for one in systems:
+        count = one.errors.shape[1]
+        columns = np.kron(np.eye(count), smooth[:, None, :]).reshape(len(r), count, -1)
+        found.append(one.with_columns(columns * one.certainty[..., None]))
+    return found
 
 
 def closure_series(fits: Sequence[Fit], data: Measurements, rows: np.ndarray) -> list[ResidualSeries]:

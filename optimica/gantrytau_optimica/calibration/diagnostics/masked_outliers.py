@@ -8,8 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gantrytau_optimica.calibration.diagnostics.link_systems import LinkSystem, freedom, variance
-from gantrytau_optimica.calibration.diagnostics.slips import SMOOTHER, for_each_link, smooth_functions
+from gantrytau_optimica.calibration.diagnostics.link_systems import (
+    SMOOTHER,
+    LinkSystem,
+    freedom,
+    variance,
+    with_smooth,
+)
 
 AGREEING = 0.6  # of the rows, which must be right
 ROUNDS = 15  # of weights, of concentration, and of rows that join
@@ -39,7 +44,7 @@ def masked_rows(systems: Sequence[LinkSystem], r: np.ndarray, limit: float) -> n
     bad, spread = ~kept, _sizes(systems, kept)[1]
     if not bad.any() or kept.sum() < most or variance(systems) < EXPLAINED * spread:
         return none
-    wide = [one.beside(for_each_link(smooth_functions(r), one.errors.shape[1])) for one in systems]
+    wide = with_smooth(systems, r)
     if freedom(wide) >= FEWEST * links and variance(wide) < SMOOTHER * spread:
         return none  # what depends on the pose that much is the model
     return bad

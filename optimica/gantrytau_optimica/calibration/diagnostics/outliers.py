@@ -18,9 +18,9 @@ from gantrytau_optimica.calibration.diagnostics.link_systems import freedom, lin
 from gantrytau_optimica.calibration.diagnostics.masked_outliers import AGREEING, masked_rows
 from gantrytau_optimica.calibration.diagnostics.plausibility import BETTER, NEAR, Misses
 from gantrytau_optimica.calibration.fitting.named_parameters import calibrated_arms, rod_links
-from gantrytau_optimica.calibration.fitting.rod_fit import Fit, fit_group, not_held
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit, fit_group
 from gantrytau_optimica.calibration.links.forward import BLOCK, RodLink
-from gantrytau_optimica.fitting.robust import OUTLIER, limit
+from gantrytau_optimica.fitting.robust import OUTLIER, limit, robust_deviations
 
 CLEANINGS = 5  # rounds of leaving suspicious poses out to see the others clearly
 MANY = 2000  # poses, from which on h is negligible
@@ -47,7 +47,7 @@ def standardised(errors: np.ndarray, spread: np.ndarray | float) -> tuple[np.nda
     """
     sizes = np.abs(errors) / spread
     # of many rows some thousand tell their median well enough
-    scales = 1.4826 * np.median(sizes[:, :: max(1, sizes.shape[1] // 5000)], axis=1)
+    scales = robust_deviations(sizes[:, :: max(1, sizes.shape[1] // 5000)], axis=1)
     return (sizes / np.maximum(scales, 1e-12)[:, None]).max(axis=0), float(scales.max())
 
 
@@ -167,15 +167,18 @@ def _spread(fits: Sequence[Fit], data: Measurements, fitted: np.ndarray) -> np.n
     """sqrt(1 -+ h) of the links, in their order, (links, N)."""
     found, sure = [], None if data.certainty is None else data.certainty[:, None]
     for fit in fits:
-        minimum, scale = fit.minimum, fit.group.scale[fit.group.free]
+        minimum, held = fit.minimum, fit.minimum.root
         here = fit.group if fitted.all() else fit.group.over(data.q, data.r, data.R)
         used = fitted.copy()
         if fit.weights is not None:
             used[fitted] = fit.weights > 0
-        held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
-        lost = minimum.directions[minimum.rank :] / not_held(fit) * scale if minimum.cost > 0 else held[:0]
+        lost = (
+            minimum.directions[minimum.rank :] / fit.smallest * minimum.scale
+            if minimum.cost > 0
+            else held[:0]
+        )
         for k, link in enumerate(here.chains):
-            J = here.slopes(fit.x, k)
+            J = here.link_jacobian(fit.x, k)
             J = J if sure is None else J * sure
             own, other = (J @ held.T) ** 2, (J @ lost.T) ** 2
             h = own.sum(axis=1)

@@ -14,13 +14,13 @@ from gantrytau.kinematics.rotations import mean_rotation, motion
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.data.measurements import thinned
 from gantrytau_optimica.calibration.data.mistakes import Mistake, mistakes
-from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.links.arm_links import ArmLink
 from gantrytau_optimica.calibration.links.closure import Chain
 from gantrytau_optimica.calibration.links.error_models import ModelLink, moved
 from gantrytau_optimica.calibration.links.linear_start import linear_start
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
-from gantrytau_optimica.fitting.finding import rows_in_words
+from gantrytau_optimica.fitting.finding import Rows
+from gantrytau_optimica.fitting.least_squares import least_squares
 
 ROUGH = 1e-3  # m, of links by their linear equations, above which their closure is solved
 NEAR = 0.1  # m by which nominal values may miss; a tape measure does better
@@ -49,11 +49,13 @@ def check_robot(
     mistake, left = min(trials, key=lambda trial: trial[1])
     if left < NEAR and left * BETTER < found:
         raise CalibrationError(
-            f"Measurements: found {mistake.words} in {rows_in_words(rows)} (links miss their lengths by "
-            f"{found * 1e3:.3g} mm in the median, {left * 1e3:.3g} mm with that undone); correct the columns of the "
-            "measurements",
+            f"found {mistake.words} in ",
+            Rows(rows),
+            f" (links miss their lengths by {found * 1e3:.3g} mm in the median, {left * 1e3:.3g} mm with that undone); "
+            "correct the columns of the measurements",
             kind=mistake.kind,
             rows=rows,
+            place="Measurements",
         )
 
 
@@ -157,7 +159,7 @@ def compare(links: Sequence[ModelLink], q: np.ndarray, r: np.ndarray, R: np.ndar
         x = linear_start(chain)
         off = _left(chain, x)
         if off > ROUGH:  # noise of millimetres in all of the equations bends what is linear in them
-            closed = gauss_newton(chain.error, chain.slopes, x, np.ones(len(x), dtype=bool)).x
+            closed = least_squares(chain.error, chain.jacobian, x).x
             x = closed if _left(chain, closed) < off else x
         left.append(_left(chain, x))
         # a joint on the plate moves the guideway that is found, in the axes of the measurements

@@ -5,10 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.data.findings import CalibrationError
-from gantrytau_optimica.fitting.finding import Finding, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows
+from gantrytau_optimica.fitting.robust import robust_deviations
 
 Array = np.ndarray
 DEGREE = 3  # of the splines of the smooth part
@@ -44,7 +46,8 @@ class Basis(Record):
         if q.size and not (q.min() >= low - 1e-9 and q.max() <= high + 1e-9):
             raise ModelError(
                 f"profile: found q from {q.min():g} to {q.max():g} m, expected positions within the measured {low:g} to "
-                f"{high:g} m"
+                f"{high:g} m",
+                argument="q",
             )
         from scipy.interpolate import BSpline
 
@@ -62,37 +65,15 @@ class Basis(Record):
         return np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(len(q), -1)
 
 
-def checked(
-    q: Any, points: Any, pitch: float | None, harmonics: int, loss: str
-) -> tuple[Array, Array, Array, list[Finding]]:
+def checked(q: Any, points: Any) -> tuple[Array, Array, Array, list[Finding]]:
     """Positions, points (N, d), their rows in the data as given, and findings; errors as of `linearity`."""
-    try:
-        q, points = np.asarray(q, dtype=float), np.asarray(points, dtype=float)
-        number = None if pitch is None else float(pitch)
-    except (TypeError, ValueError):
-        raise ModelError(
-            "linearity: found q, points or pitch that hold no numbers, expected some in m"
-        ) from None
-    points = points[:, None] if points.ndim == 1 else points
-    if q.ndim != 1 or points.shape not in ((len(q), 3), (len(q), 1)):
-        raise ModelError(
-            f"linearity: found q of shape {q.shape} and points of shape {points.shape}, expected (N,) and (N, 3), or (N,) "
-            "for lengths along the axis"
-        )
-    if number is not None and not 0 < number < np.inf:
-        raise ModelError(f"linearity: found pitch={pitch!r}, expected a length above 0 in m")
-    if loss not in ("linear", "robust"):
-        raise ModelError(f"linearity: found loss={loss!r}, expected 'linear' or 'robust'")
-    if not isinstance(harmonics, int | np.integer) or harmonics < 1:
-        raise ModelError(
-            f"linearity: found harmonics={harmonics!r}, expected 1 or more; leave pitch out for no waves"
-        )
+    q = array("linearity", "q", q, (None,), finite=False)
+    points = array("linearity", "points", points, (len(q), 3), (len(q),), finite=False).reshape(len(q), -1)
     finite = np.isfinite(q) & np.isfinite(points).all(axis=1)
     rows, lost = np.flatnonzero(finite), np.flatnonzero(~finite)
     findings = []
     if lost.size:
-        words = f"{rows_in_words(lost)} hold no finite numbers and are left out"
-        findings.append(Finding("nan", lost, words))
+        findings.append(Finding("nan", lost, (Rows(lost), " hold no finite numbers and are left out")))
     if len(np.unique(q[rows])) < 2 * (DEGREE + 1):
         raise CalibrationError(
             f"linearity: found {len(np.unique(q[rows]))} different positions of the cart, expected {2 * (DEGREE + 1)} at "
@@ -123,8 +104,9 @@ def _refuse_wrong_numbers(q: Array, points: Array, rows: Array) -> None:
     astray = off > ASTRAY * length + EXACT
     if np.any(astray) and length > 0:
         raise CalibrationError(
-            f"linearity: found points up to {off.max():.3g} m beside a straight line in {rows_in_words(rows[astray])}, "
-            "expected those of one guideway; correct them, or leave them out",
+            f"linearity: found points up to {off.max():.3g} m beside a straight line in ",
+            Rows(rows[astray]),
+            ", expected those of one guideway; correct them, or leave them out",
             kind="outliers",
             rows=rows[astray],
         )
@@ -133,11 +115,10 @@ def _refuse_wrong_numbers(q: Array, points: Array, rows: Array) -> None:
 def approach(q: Array, rising: Any, rows: Array, given: int) -> Array:
     """The direction from which the cart came to each point, 1 or -1; the first counts as the second."""
     if rising is not None:
-        found = np.asarray(rising, dtype=float)
-        if found.shape != (given,) or not np.all(np.isin(found, (-1.0, 0.0, 1.0))):
+        found = array("linearity", "rising", rising, (given,))
+        if not np.all(np.isin(found, (-1.0, 0.0, 1.0))):
             raise ModelError(
-                "linearity: found rising of another length than q, or with values other than 1, -1 and 0 (unknown); "
-                "expected one for each row"
+                "expected 1, -1 or 0 (unknown)", place="linearity", found=Given("rising", rising)
             )
         return found[rows]
     return _directions(q)
@@ -159,8 +140,8 @@ def axes_along(along: Array, up: Array) -> Array:
     """Rows along a unit vector, to the side and upwards, (d, d)."""
     if along.size == 1:
         return np.sign(along)[:, None]
-    if up.shape != (3,) or not np.isfinite(up).all() or not np.any(up):
-        raise ModelError(f"linearity: found up={up.tolist()}, expected a direction (3,)")
+    if not np.any(up):
+        raise ModelError("expected a direction", place="linearity", found=Given("up", up))
     side = np.cross(up, along)
     if np.linalg.norm(side) < 1e-3 * np.linalg.norm(up):
         side = np.cross([1.0, 0.0, 0.0], along)  # a guideway that is itself upright
@@ -170,8 +151,6 @@ def axes_along(along: Array, up: Array) -> Array:
 
 def _intervals(q: Array, pitch: float | None, intervals: int | None) -> int:
     if intervals is not None:
-        if not isinstance(intervals, int | np.integer) or intervals < 1:
-            raise ModelError(f"linearity: found intervals={intervals!r}, expected 1 or more")
         return intervals
     longest = MOST_INTERVALS if pitch is None else np.ptp(q) / (PITCHES_PER_INTERVAL * pitch)
     return int(max(1, min(MOST_INTERVALS, longest, len(np.unique(q)) / ROWS_PER_UNKNOWN - DEGREE)))
@@ -269,12 +248,12 @@ def fitted(columns: Array, error: Array) -> tuple[Array, Array, Array]:
 def fitting(columns: Array, points: Array) -> Array:
     """Which points fit a curve through those that do, (N,)."""
     left = _left_by_most(columns, points)
-    fits = np.all(np.abs(left) <= STRAY * np.maximum(1.4826 * np.median(np.abs(left), axis=0), EXACT), axis=1)
+    fits = np.all(np.abs(left) <= STRAY * np.maximum(robust_deviations(left), EXACT), axis=1)
     if np.count_nonzero(fits) <= columns.shape[1]:
         fits = np.ones(len(points), dtype=bool)
     for _ in range(ROUNDS):  # one stray point bends the curve near it and makes its neighbours look stray
         left = points - columns @ np.linalg.lstsq(columns[fits], points[fits], rcond=None)[0]
-        usual = 1.4826 * np.median(np.abs(left[fits]), axis=0)  # 1.4826: of normal noise
+        usual = robust_deviations(left[fits])
         before, fits = fits, np.all(np.abs(left) <= STRAY * np.maximum(usual, EXACT), axis=1)
         if np.array_equal(before, fits) or np.count_nonzero(fits) <= columns.shape[1]:
             break
@@ -297,5 +276,5 @@ def outliers(stray: Array) -> list[Finding]:
     """The finding that rows are stray, if there are any."""
     if not stray.size:
         return []
-    words = f"{rows_in_words(stray)} do not fit the others; measure them again, or leave them out with loss='robust'"
-    return [Finding("outliers", stray, words)]
+    words = " do not fit the others; measure them again, or leave them out with "
+    return [Finding("outliers", stray, (Rows(stray), words, Given("loss", "robust")))]

@@ -11,11 +11,12 @@ which all standard errors follow.
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, check_words, number, whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.error_analysis.guideway_fit import (
     HIDDEN,
@@ -100,7 +101,7 @@ class Linearity(Record):
 
         Positions beyond the measured ones raise ModelError.
         """
-        rows = self.basis.smooth(np.atleast_1d(np.asarray(q, dtype=float)))
+        rows = self.basis.smooth(np.atleast_1d(array("profile", "q", q, (), (None,))))
         count = rows.shape[1]
         variance = np.einsum("mi,ij,mj->m", rows, self.covariance[:count, :count], rows)
         return rows @ self.coefficients[:count], np.sqrt(variance)[:, None] * self.noise
@@ -116,9 +117,11 @@ class Linearity(Record):
         A least-squares spectrum, columns as of `error`, (F, d): it needs no even spacing. A wave that smooth part or
         backlash can imitate is NaN. Raises ModelError for periods that are not above zero.
         """
-        periods = np.atleast_1d(np.asarray(periods, dtype=float))
+        periods = np.atleast_1d(array("spectrum", "periods", periods, (), (None,)))
         if not np.all(periods > 0):
-            raise ModelError("spectrum: found periods that are not above zero, expected lengths in m")
+            raise ModelError(
+                "expected lengths above 0 in m", place="spectrum", found=Given("periods", periods)
+            )
         rest = np.linalg.qr(self.basis.others(self.q, self.rising))[0]
         left = self.error - rest @ (rest.T @ self.error)
         wave = np.exp(2j * np.pi * self.q[:, None] / periods)
@@ -188,7 +191,7 @@ def linearity(
     rising: Any = None,
     intervals: int | None = None,
     up: Any = (0.0, 0.0, 1.0),
-    loss: str = "linear",
+    loss: Literal["linear", "robust"] = "linear",
 ) -> Linearity:
     """How straight a guideway is and how its drive errs, from points measured along it.
 
@@ -200,8 +203,13 @@ def linearity(
     which they are.
     Raises ModelError for other shapes, CalibrationError (`.rows`) for data that do not hold what is asked.
     """
+    check_words(linearity, locals())
+    pitch = None if pitch is None else number("linearity", "pitch", pitch, above=0.0)
+    whole("linearity", "harmonics", harmonics, least=1)
+    intervals = None if intervals is None else whole("linearity", "intervals", intervals, least=1)
+    up = array("linearity", "up", up, (3,))
     given = np.size(q)
-    q, points, rows, findings = checked(q, points, pitch, harmonics, loss)
+    q, points, rows, findings = checked(q, points)
     rising = approach(q, rising, rows, given)
     design = np.column_stack([np.ones(len(q)), q])
     (start, direction), *_ = np.linalg.lstsq(design, points, rcond=None)
@@ -214,7 +222,7 @@ def linearity(
     findings += outliers(rows[~fits])
     if loss == "robust":
         (start, direction), *_ = np.linalg.lstsq(design[fits], points[fits], rcond=None)
-    axes = axes_along(direction / np.linalg.norm(direction), np.asarray(up, dtype=float))
+    axes = axes_along(direction / np.linalg.norm(direction), up)
     error = (points - design @ [start, direction]) @ axes.T
     used = fits if loss == "robust" else slice(None)
     coefficients, covariance, noise = fitted(columns[used], error[used])

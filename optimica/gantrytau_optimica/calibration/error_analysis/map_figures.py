@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.results.figures import finished
 from gantrytau_optimica.calibration.error_analysis.guideway_figures import MICRO, panels_of
 
@@ -42,9 +43,8 @@ def draw_map(
 ) -> "Figure":
     """Errors as coloured arrows on a plane; each panel holds the poses of one layer along the third axis."""
     if len(axes) != 2 or axes[0] == axes[1] or not set(axes) <= set("xyz"):
-        raise ModelError(f"plot: found axes={axes!r}, expected two of x, y and z, such as 'yz'")
-    if not 1 <= layers <= MOST_LAYERS:
-        raise ModelError(f"plot: found layers={layers!r}, expected 1 to {MOST_LAYERS}")
+        raise ModelError("expected two of x, y and z, such as 'yz'", place="plot", found=Given("axes", axes))
+    whole("plot", "layers", layers, least=1, most=MOST_LAYERS)
     first, second = ("xyz".index(a) for a in axes)
     third = 3 - first - second
     figure, panels = panels_of(1, file, layers, sharey=True, figsize=(1.6 + 3.8 * layers, 4.4))

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 
 from gantrytau import Model
-from gantrytau.border.refusal import ModelError
+from gantrytau.border.checks import array, whole
+from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses, vectors
@@ -172,16 +173,16 @@ def orientation_errors(
         raise ModelError(
             "orientation_errors: found poses without orientation or with NaN, expected numbers; leave such rows out"
         )
-    direction, one = vectors(along, 3, "along", "orientation_errors")
+    direction = array("orientation_errors", "along", along, (3,))
     size = np.linalg.norm(direction)
-    if not one or not size > 0:
-        raise ModelError(f"orientation_errors: found along={along!r}, expected a direction (3,)")
+    if not size > 0:
+        raise ModelError("expected a direction", place="orientation_errors", found=Given("along", along))
     if reference is None:
         reference = mean_rotation(found.R)
     reference = poses(np.zeros(3), reference, "orientation_errors: reference").R
     assert reference is not None
     turns = rotation_vector(found.R @ reference[0].T)
-    return OrientationErrors(found.r, found.R, reference[0], turns, direction[0] / size)
+    return OrientationErrors(found.r, found.R, reference[0], turns, direction / size)
 
 
 def orientation_causes(robot: Model | Kinematics, q: Any, r: Any, R: Any, *, degree: int = 4) -> Causes:
@@ -191,6 +192,7 @@ def orientation_causes(robot: Model | Kinematics, q: Any, r: Any, R: Any, *, deg
     polynomials in q for shifts and turns of each cart. Raises ModelError for a robot without six links on three carts,
     CalibrationError (`.rows`) for too few poses.
     """
+    whole("orientation_causes", "degree", degree, least=1)
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
     geometry = kinematics.linked("orientation_causes").geometry
     if len(geometry.length) != 6 or geometry.turntables:
@@ -297,8 +299,7 @@ def _chance(explained: Array, rest: Array, unknowns: float, spare: float) -> flo
 
 
 def _by_layers(found: OrientationErrors, degree: int) -> Causes:
-    if degree < 1:
-        raise ModelError(f"by_layers: found degree={degree!r}, expected 1 or more")
+    whole("by_layers", "degree", degree, least=1)
     x = found.r @ found.along
     across = np.linalg.svd(found.along[None])[2][1:]
     y, z = across @ found.r.T

@@ -15,12 +15,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
+from gantrytau_optimica.fitting.covariance import spread_by
+from gantrytau_optimica.fitting.robust import robust_deviations
 
 ALIKE = 4.0  # standard deviations by which estimated noises may differ and count as one
 LEAST = 0.1  # of the squares of what is left, that are at the least no errors which poses share
-MOVED = 0.1  # share of a number in a direction that data do not hold, from which on it is undetermined
 
 
 def link_noise(
@@ -42,7 +42,7 @@ def link_noise(
         share = fit.minimum.rank / distances.shape[1]
         freedom = max(1.0, len(distances) - share)
         if loss == "robust":
-            squares = (1.4826 * np.median(np.abs(distances), axis=0)) ** 2
+            squares = robust_deviations(distances) ** 2
         else:
             squares = np.sum(distances**2, axis=0)
             squares = np.maximum(squares - known, LEAST * squares) / freedom
@@ -60,7 +60,7 @@ def _shared_squares(fit: Fit, along: list[np.ndarray], shared: np.ndarray, seen:
     """What errors that poses share leave of the squares of distances of each link, once numbers followed them, (links,)."""
     unit = [np.linalg.norm(u, axis=1) * f for u, f in zip(along, seen.T, strict=True)]
     X = np.stack([np.einsum("ni,nik->nk", u, shared) / s[:, None] for u, s in zip(along, unit, strict=True)])
-    J = np.stack([fit.group.slopes(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
+    J = np.stack([fit.group.link_jacobian(fit.x, k) / s[:, None] for k, s in enumerate(unit)])
     Q = np.linalg.qr(J.reshape(-1, J.shape[2]) * fit.group.scale[fit.group.free])[0]
     flat = X.reshape(-1, X.shape[2])
     return np.sum((flat - Q @ (Q.T @ flat)).reshape(X.shape) ** 2, axis=(1, 2))
@@ -123,27 +123,15 @@ def joint_covariance(
     together = np.zeros((starts[-1], 0 if shared is None else shared.shape[2]))
     for (f, k), by_pose in zip(parts, moved, strict=True):
         fit, part = fits[f], slice(starts[f], starts[f + 1])
-        J = fit.group.slopes(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
+        J = fit.group.link_jacobian(fit.x, k) * (1.0 if fit.weights is None else (fit.weights**2)[:, None])
         middle[part] += np.einsum("np,na->pna", J, by_pose)
         if shared is not None:
             u = fit.group.chains[k].by_pose(fit.group.numbers(k, fit.x))[0]
             together[part] += J.T @ np.einsum("ni,nik->nk", u, shared)
     priors = np.asarray(block_diag(*[_of_prior(fit) for fit in fits]))
-    inverses = [as_told(fit) @ inverse_of(fit.minimum, fit.group.scale[fit.group.free]) for fit in fits]
+    inverses = [as_told(fit) @ fit.minimum.inverse for fit in fits]
     inverse = np.asarray(block_diag(*inverses))
     return spread_by(inverse, middle.reshape(starts[-1], -1), together, priors)
-
-
-def spread_by(inverse: np.ndarray, *moved: np.ndarray) -> np.ndarray:
-    """Covariance (n, n) of numbers; moved: what each independent error, of one deviation, adds to J'WWe, in columns."""
-    half = inverse @ np.hstack(moved)
-    return half @ half.T
-
-
-def inverse_of(minimum: Minimum, scale: np.ndarray) -> np.ndarray:
-    """(J'J)^-1 in the directions that were moved."""
-    held = minimum.directions[: minimum.rank] / minimum.singular[: minimum.rank, None] * scale
-    return held.T @ held
 
 
 def _moved(
@@ -173,10 +161,10 @@ def _moved(
 
 
 def _of_prior(fit: Fit) -> np.ndarray:
-    """What the rows of the prior, the last of the slopes, add to J'e, in columns."""
+    """What the rows of the prior, the last of the Jacobian, add to J'e, in columns."""
     count = len(fit.group.prior)
-    rows = fit.minimum.slopes[len(fit.minimum.slopes) - count :] / fit.group.scale[fit.group.free]
-    return rows.T * np.sqrt(fit.minimum.cost / max(1, fit.count - fit.minimum.rank))
+    rows = fit.minimum.jacobian[len(fit.minimum.jacobian) - count :] / fit.minimum.scale
+    return rows.T * fit.minimum.noise(fit.count)
 
 
 def as_told(fit: Fit) -> np.ndarray:
@@ -187,10 +175,3 @@ def as_told(fit: Fit) -> np.ndarray:
         if told is not None:
             whole[np.ix_(places, places)] = told
     return whole[np.ix_(fit.group.free, fit.group.free)]
-
-
-def undetermined(minimum: Minimum, names: Sequence[str], told: np.ndarray | None = None) -> tuple[str, ...]:
-    """Names of the numbers that take part in directions that data do not hold; told: as of `as_told`."""
-    lost = minimum.directions[minimum.rank :]
-    part = np.abs(lost if told is None else lost @ told.T).max(axis=0, initial=0.0)
-    return tuple(n for n, share in zip(names, part, strict=True) if share > MOVED)

@@ -2,20 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau.border.checks import check_words, number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.fitting.covariance import joint_covariance
-from gantrytau_optimica.calibration.fitting.rod_fit import (
-    Fit,
-    Prior,
-    fit_group,
-    fit_robust,
-    with_prior,
-)
+from gantrytau_optimica.calibration.fitting.priors import with_prior
+from gantrytau_optimica.calibration.fitting.rod_fit import fit_groups
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
 from gantrytau_optimica.calibration.links.arm_factors import checked_poses
 from gantrytau_optimica.calibration.links.error_models import grouped, links_of_arm
@@ -50,7 +45,7 @@ def fit_arm(
     noise: float | None = None,
     tape: float = TAPE,
     prior: Mapping[str, Any] | None = None,
-    loss: str = "linear",
+    loss: Literal["linear", "robust"] = "linear",
 ) -> ArmFit:
     """Fit the unknowns of an arm to measured poses.
 
@@ -59,25 +54,26 @@ def fit_arm(
     stays near them; prior, loss: as of `calibrate`.
     Raises ModelError for other words, unknown names, arrays whose shapes do not fit or numbers that are not finite.
     """
-    if loss not in ("linear", "robust"):
-        raise ModelError(f"loss: found {loss!r}, expected 'linear' or 'robust'")
-    (group,) = with_prior(grouped(links_of_arm(arm, *checked_poses(arm, q, r, R))), Prior(prior, {}))
+    check_words(fit_arm, locals())
+    noise = None if noise is None else number("fit_arm", "noise", noise, above=0.0)
+    tape = number("fit_arm", "tape", tape, above=0.0)
+    data = checked_poses(arm, q, r, R)
+    (group,) = with_prior(grouped(links_of_arm(arm, *data)), prior, {})
     if noise is not None:
-        unit = 1.0 if group.arms else 2 * float(np.mean(arm.lengths))
-        group = replace(group, noise=noise * unit)
-    group = replace(group, tape=tape)
-    fit = fit_robust([group])[0] if loss == "robust" else fit_group(group)
-    return _as_arm(arm, fit, loss, checked_poses(arm, q, r, R))
-
-
-def _as_arm(arm: ArmClosure, fit: Fit, loss: str, data: tuple) -> ArmFit:
-    order = [fit.group.names.index(name) for name in arm.names]
-    found = arm.moved((fit.x - fit.group.x)[order])
+        group = replace(group, noise=noise if group.arms else noise * 2 * float(np.mean(arm.lengths)))
+    (fit,) = fit_groups([replace(group, tape=tape)], loss)
+    order = [group.names.index(name) for name in arm.names]
+    found = arm.moved((fit.x - group.x)[order])
     residuals = found.closure(*data)[0]
     degrees = max(
         1.0, len(residuals) - arm.count / len(arm.lengths)
-    )  # each link has its share of the unknowns
-    deviation = float(np.sqrt((residuals**2).sum() / degrees / len(arm.lengths)))
-    covariance = joint_covariance([fit], loss)[np.ix_(order, order)]
-    minimum = fit.minimum
-    return ArmFit(found, minimum.iterations, minimum.success, residuals, minimum.rank, deviation, covariance)
+    )  # links have their shares of the unknowns
+    return ArmFit(
+        arm=found,
+        iterations=fit.minimum.iterations,
+        success=fit.minimum.success,
+        residuals=residuals,
+        rank=fit.minimum.rank,
+        deviation=float(np.sqrt((residuals**2).sum() / degrees / len(arm.lengths))),
+        covariance=joint_covariance([fit], loss)[np.ix_(order, order)],
+    )

@@ -1,6 +1,6 @@
 """The same least squares by CasADi and Ipopt: another route to the minimum, with exact second derivatives."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,12 +9,11 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from gantrytau import SolveError
-from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, read_constraints
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
-from gantrytau_optimica.calibration.fitting.least_squares import problem
-from gantrytau_optimica.calibration.fitting.rod_fit import Fit, noise_of, not_held
+from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, ParameterConstraint, read_constraints
+from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
 from gantrytau_optimica.calibration.links.groups import Group
+from gantrytau_optimica.fitting.least_squares import Minimum
 
 TOLERANCE = 1e-8  # deviations, about, of numbers: of the gradient of the cost in squares of the noise
 ROUNDED = 1e-6  # the same of closure errors of turntables, whose roundings leave 5e-7
@@ -33,45 +32,66 @@ OPTIONS = {
 }
 
 
-def solve(fit: Fit) -> Fit:
-    """The fit found again by Ipopt, from the start values of its group, with its weights and its prior.
+def solve(fits: Sequence[Fit], constraints: Mapping[str, Any] | None = None) -> list[Fit]:
+    """The fits found again by Ipopt, with their weights and priors: each from the start values of its group; or all as one,
+    from the minimum of Gauss-Newton, whose parameters keep constraints.
 
-    Directions that Gauss-Newton left alone are held where it left them by equality constraints. Raises SolveError
-    where Ipopt finds no minimum.
+    Directions that Gauss-Newton left alone stay where it left them, or with constraints are drawn there by a tape measure.
+    ModelError for constraints on what is not identified, SolveError where Ipopt finds no minimum.
     """
-    group, free = fit.group, np.flatnonzero(fit.group.free)
-    noise = max(noise_of(fit.minimum, fit.group), LEAST)
-    steps = _steps(fit, noise)
+    if not constraints:
+        return [_solved(fit, []) for fit in fits]
+    whole = _merged(fits)
+    return [_solved(whole, read_constraints(constraints, whole.free_names))]
+
+
+def _solved(fit: Fit, constraints: Sequence[ParameterConstraint]) -> Fit:
+    group, rank, free = fit.group, fit.minimum.rank, np.flatnonzero(fit.group.free)
+    noise = max(fit.noise, LEAST_STEP if constraints else LEAST)
+    steps, middle = _steps(fit, noise), fit.x[free]
     unknown = ca.MX.sym("x", len(free))
+    free_of = ca.DM(middle) + ca.DM(steps) @ unknown
     x = ca.MX(ca.DM(group.x))
-    x[free.tolist()] = ca.DM(fit.x[free]) + ca.DM(steps) @ unknown
-    rows, held = _residuals(fit, x, noise), unknown[fit.minimum.rank :]
-    solver = _solver(rows, unknown, held, bool(group.arms), OPTIONS)
-    start = np.linalg.solve(steps, group.x[free] - fit.x[free])
-    start[fit.minimum.rank :] = 0.0
-    found, steps_taken = _solved(
-        solver, "a minimum; take method='gauss-newton', or start='linear'", x0=start, lbg=0.0, ubg=0.0
-    )
-    numbers = group.x.copy()
-    numbers[free] = fit.x[free] + steps @ np.array(found["x"]).ravel()
-    left = problem(group, fit.weights, noise_of(fit.minimum, group))
-    J = left.slopes(numbers)[:, group.free]
-    _, singular, directions = np.linalg.svd(J, full_matrices=False)
-    rank = fit.minimum.rank
-    return replace(
-        fit, minimum=Minimum(numbers, left.errors(numbers), J, singular, directions, rank, steps_taken, True)
-    )
-
-
-def _solved(solver: ca.Function, expected: str, **given: Any) -> tuple[Any, int]:
-    """What Ipopt found, and in how many iterations; SolveError where it is no minimum."""
-    found, stats = solver(**given), solver.stats()
+    x[free.tolist()] = free_of
+    rows, lost = _residuals(fit, x, noise), unknown[rank:]
+    if constraints:
+        rows = ca.vertcat(lost, rows)
+        kept = ca.vertcat(*[each.expression(free_of) for each in constraints])
+        low, high = (
+            np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high")
+        )
+        start, exact = np.zeros(len(free)), {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
+        remedy = "that keeps the constraints; look whether they contradict each other"
+    else:
+        kept, low, high, exact = lost, np.zeros(lost.numel()), np.zeros(lost.numel()), {}
+        start = np.linalg.solve(steps, group.x[free] - middle)
+        start[rank:] = 0.0
+        remedy = "; take method='gauss-newton', or start='linear'"
+    solver = _solver(rows, unknown, kept, bool(group.arms), OPTIONS | exact)
+    found, stats = solver(x0=start, lbg=low, ubg=high), solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
         raise SolveError(
-            f"calibrate: Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected "
-            f"{expected}"
+            f"Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a minimum{remedy}",
+            place="calibrate",
         )
-    return found, int(stats["iter_count"])
+    numbers = group.x.copy()
+    numbers[free] = middle + steps @ np.array(found["x"]).ravel()
+    across = np.eye(len(free))
+    if constraints:
+        value = np.array(found["g"]).ravel()
+        active = np.minimum(value - low, high - value) < AT_LIMIT
+        normals = np.array(ca.Function("normals", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))[
+            active
+        ]
+        normals = normals @ np.linalg.inv(steps) * group.scale[free]
+        _, sizes, across = np.linalg.svd(normals, full_matrices=True)
+        across = across[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
+    at = group.condensed(fit.weights).minimum(
+        numbers, fit.noise, smallest=fit.smallest, along=across, steps=0
+    )
+    rank = at.rank if constraints else rank
+    minimum = replace(at, rank=rank, iterations=int(stats["iter_count"]), success=True)
+    return replace(fit, minimum=minimum)
 
 
 def _residuals(fit: Fit, x: ca.MX, noise: float) -> ca.MX:
@@ -99,37 +119,6 @@ def _solver(rows: ca.MX, unknown: ca.MX, kept: ca.MX, arms: bool, options: dict[
     return ca.nlpsol("calibration", "ipopt", problem, options)
 
 
-def solve_constrained(fits: Sequence[Fit], given: Any) -> list[Fit]:
-    """All fits as one, by Ipopt, whose numbers keep constraints; from the minimum without them.
-
-    Directions that data do not hold are drawn to where they are by a tape measure. Raises ModelError for constraints on
-    what is not identified, SolveError where none or no minimum is found.
-    """
-    whole = _merged(fits)
-    group, minimum, free = whole.group, whole.minimum, np.flatnonzero(whole.group.free)
-    constraints = read_constraints(given, whole.free_names)
-    noise = max(noise_of(whole.minimum, group), LEAST_STEP)
-    unknown = ca.MX.sym("x", len(free))
-    steps, begin = _steps(whole, noise), minimum.x[free]
-    numbers_of = ca.DM(begin) + ca.DM(steps) @ unknown
-    x = ca.MX(ca.DM(group.x))
-    x[free.tolist()] = numbers_of
-    rows = ca.vertcat(unknown[minimum.rank :], _residuals(whole, x, noise))
-    kept = ca.vertcat(*[each.expression(numbers_of) for each in constraints])
-    low, high = (np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high"))
-    options = OPTIONS | {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
-    solver = _solver(rows, unknown, kept, bool(group.arms), options)
-    expected = "a minimum that keeps the constraints; look whether they contradict each other"
-    found, iterations = _solved(solver, expected, x0=0.0, lbg=low, ubg=high)
-    numbers = group.x.copy()
-    numbers[free] = begin + steps @ np.array(found["x"]).ravel()
-    value = np.array(found["g"]).ravel()
-    active = np.minimum(value - low, high - value) < AT_LIMIT
-    slopes = np.array(ca.Function("slopes", [unknown], [ca.jacobian(kept, unknown)])(found["x"]))
-    slopes = slopes @ np.linalg.inv(steps) * group.scale[free]
-    return [_constrained(whole, numbers, slopes[active], iterations)]
-
-
 def _steps(fit: Fit, noise: float) -> np.ndarray:
     """One deviation of the numbers along each direction, of those that data do not hold by tape, in columns, (n, n).
 
@@ -139,18 +128,6 @@ def _steps(fit: Fit, noise: float) -> np.ndarray:
     sizes = np.full(len(minimum.directions), fit.group.tape)
     sizes[: minimum.rank] = noise / minimum.singular[: minimum.rank]
     return minimum.directions.T * sizes * fit.group.scale[fit.group.free][:, None]
-
-
-def _constrained(fit: Fit, x: np.ndarray, kept: np.ndarray, iterations: int) -> Fit:
-    """The fit at x, which moves only across the slopes of the constraints it keeps."""
-    found = problem(fit.group, fit.weights, noise_of(fit.minimum, fit.group))
-    J = found.slopes(x)[:, fit.group.free]
-    _, sizes, rows = np.linalg.svd(kept, full_matrices=True)
-    across = rows[int((sizes > 1e-9 * sizes.max(initial=0.0)).sum()) :]
-    _, singular, inside = np.linalg.svd(J @ across.T, full_matrices=False)
-    rank = int((singular > not_held(fit)).sum())
-    minimum = Minimum(x, found.errors(x), J, singular, inside @ across, rank, iterations, True)
-    return replace(fit, minimum=minimum)
 
 
 def _merged(fits: Sequence[Fit]) -> Fit:
@@ -171,15 +148,15 @@ def _merged(fits: Sequence[Fit]) -> Fit:
     )
     held = np.asarray(block_diag(*[m.directions[: m.rank] for m in minima]))
     lost = np.asarray(block_diag(*[m.directions[m.rank :] for m in minima]))
-    singular = np.concatenate([*(m.singular[: m.rank] for m in minima), np.zeros(len(lost))])
     minimum = Minimum(
-        np.concatenate([m.x for m in minima]),
-        np.concatenate([m.errors for m in minima]),
-        np.zeros((0, len(singular))),
-        singular,
-        np.vstack([held, lost]),
-        len(held),
-        max(m.iterations for m in minima),
-        all(m.success for m in minima),
+        x=np.concatenate([m.x for m in minima]),
+        residuals=np.concatenate([m.residuals for m in minima]),
+        jacobian=np.zeros((0, len(held) + len(lost))),
+        singular=np.concatenate([*(m.singular[: m.rank] for m in minima), np.zeros(len(lost))]),
+        directions=np.vstack([held, lost]),
+        rank=len(held),
+        scale=np.concatenate([m.scale for m in minima]),
+        iterations=max(m.iterations for m in minima),
+        success=all(m.success for m in minima),
     )
-    return Fit(group, minimum, max(fit.smallest for fit in fits), fits[0].weights)
+    return Fit(group, minimum, fits[0].weights)

@@ -16,11 +16,18 @@ from gantrytau import Model
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import left_jacobian, motion, of_vector, rotation_vector, skewed
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum, gauss_newton
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.links.arm_factors import LEVER
 from gantrytau_optimica.calibration.links.groups import TAPE
-from gantrytau_optimica.fitting.robust import BISQUARE, OUTLIER, limit, robust_deviation, without_strays
+from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squares
+from gantrytau_optimica.fitting.robust import (
+    OUTLIER,
+    huber_weights,
+    limit,
+    robust_deviation,
+    tukey_roots,
+    without_strays,
+)
 
 Array = np.ndarray
 FRAME = tuple(f"frame.{part}[{k}]" for part in ("R", "t") for k in range(3))
@@ -70,11 +77,11 @@ class PoseResiduals(Record):
             return e
         return np.hstack([e, self.lever * rotation_vector(R @ self.data.R @ np.swapaxes(turned, 1, 2))])
 
-    def slopes(self, x: Array) -> Array:
+    def jacobian(self, x: Array) -> Array:
         """Their derivatives by x, (N, 3 or 6, n)."""
         R, _, p = self.frame(x)
         units = np.repeat([1.0, self.lever], 3)[: 6 if self.tool.turning else 3]
-        found = -self.tool.slopes(self.data.q, p) * units[:, None]
+        found = -self.tool.jacobian(self.data.q, p) * units[:, None]
         if self.turn is None:
             return found
         count, rows = found.shape[:2]
@@ -87,25 +94,24 @@ class PoseResiduals(Record):
 
     def minimum(self, x: Array, noise: float) -> Minimum:
         """Least squares from x; what poses tell less of than a tape measure stays there, by the noise, m."""
-        places, values = list(self.prior), list(self.prior.values())
+        held = self.prior.values()
+        prior = Prior(list(self.prior), [m for m, _ in held], [noise / deviation for _, deviation in held])
+        return least_squares(
+            lambda x: (self.poses(x) * self.weights[:, None]).ravel(),
+            self.weighted_jacobian,
+            x,
+            scale=self.scale,
+            priors=[prior],
+            smallest=noise / TAPE * (1 - 1e-6),
+        )
 
-        def errors(x: Array) -> Array:
-            left = (self.poses(x) * self.weights[:, None]).ravel()
-            return np.concatenate(
-                [left, [noise * (x[i] - m) / d for i, (m, d) in zip(places, values, strict=True)]]
-            )
-
-        def slopes(x: Array) -> Array:
-            rows = np.eye(len(x))[places] * np.array([[noise / d] for _, d in values]).reshape(-1, 1)
-            J = (self.slopes(x) * self.weights[:, None, None]).reshape(-1, len(x))
-            return np.vstack([J, rows]) * self.scale
-
-        free = np.ones(len(x), dtype=bool)
-        return gauss_newton(errors, slopes, x, free, scale=self.scale, smallest=noise / TAPE * (1 - 1e-6))
+    def weighted_jacobian(self, x: Array) -> Array:
+        """Derivatives of all weighted residuals, (m, n)."""
+        return (self.jacobian(x) * self.weights[:, None, None]).reshape(-1, len(x))
 
     def robust(self, x: Array) -> tuple[Array, float, float]:
         """What a fit that strays do not lead would leave, (N, 3 or 6) by its weights, and deviations of places and turns."""
-        J = (self.slopes(x) * self.weights[:, None, None]).reshape(-1, len(x)) * self.scale
+        J = self.weighted_jacobian(x) * self.scale
         left = (self.poses(x) * self.weights[:, None]).ravel()
         used = np.repeat(self.weights > 0, len(left) // len(self.weights))
         left[used] = without_strays(left[used], J[used])
@@ -129,12 +135,14 @@ def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseR
     )
 
 
-def named_slopes(robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any) -> Array:
+def named_jacobian(
+    robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any
+) -> Array:
     """Slopes of poses (q, r, R) by named parameters and a frame, (N, 3 or 6, n), each number by what moves a metre."""
     q, r, R = poses
     tool = tool_function(robot, parameters, joints, R is not None)
     residuals, x = started(tool, Measurements(q, r, R), True)
-    return residuals.slopes(x) * residuals.scale
+    return residuals.jacobian(x) * residuals.scale
 
 
 def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResiduals, Minimum, float]:
@@ -148,10 +156,10 @@ def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResidu
         weights = sure
         if robust:
             sizes = np.abs(replace(residuals, weights=sure).robust(minimum.x)[0]).max(axis=1) / noise
-            weights = sure * np.maximum(1 - (sizes / BISQUARE) ** 2, 0.0)
+            weights = sure * tukey_roots(sizes)
             if 2 * np.count_nonzero(weights) <= len(weights):  # far off, where the least sum of amounts leads
                 amounts = np.abs(residuals.poses(minimum.x)).max(axis=1)
-                weights = sure * np.sqrt(np.minimum(np.median(amounts) / np.maximum(amounts, LEAST), 1.0))
+                weights = sure * np.sqrt(huber_weights(np.maximum(amounts, LEAST), float(np.median(amounts))))
         settled = abs(noise - before) < 0.01 * noise and np.abs(weights - residuals.weights).max() < 1e-3
         residuals = replace(residuals, lever=float(np.clip(lever, 1e-3, 1e3)), weights=weights)
         held = minimum.rank == len(x) and minimum.singular.min() > noise / TAPE

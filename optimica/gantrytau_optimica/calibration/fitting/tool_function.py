@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau import Dae, Model, ModelError, translate
-from gantrytau.border.refusal import did_you_mean
+from gantrytau.border.checks import instance
+from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau.kinematics.model_functions import SPIN, orientations
@@ -44,9 +45,9 @@ class ToolFunction(Record):
         found = self._function(*self._arguments(q, p))
         return found[0], found[1].reshape(-1, 3, 3).transpose(0, 2, 1) if self.turning else None
 
-    def slopes(self, q: Array, p: Array) -> Array:
+    def jacobian(self, q: Array, p: Array) -> Array:
         """Derivatives by the parameters of the place, and of a turn in the world where it is asked for, (N, 3 or 6, k)."""
-        by_all = self._function.slopes(*self._arguments(q, p))[:, :, len(self.joints) :]
+        by_all = self._function.jacobian(*self._arguments(q, p))[:, :, len(self.joints) :]
         if not self.turning:
             return by_all
         R = self(q, p)[1]
@@ -67,29 +68,22 @@ def tool_function(
     robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, turning: bool, tool: str = "tool"
 ) -> ToolFunction:
     """The function of a robot; ModelError for one without tool, driven joints or a parameter of such a name."""
-    if not isinstance(robot, Model):
-        raise ModelError(
-            f"calibrate: found {robot!r} as robot, expected a model instance with a tool and driven joints"
-        )
+    instance("calibrate", "robot", robot, Model, "a model instance with a tool and driven joints")
     if isinstance(parameters, str) or not parameters:
-        raise ModelError(
-            f"calibrate: found parameters={parameters!r}, expected a list of names of the model, as ['upper.r', 'h']",
-            argument="parameters",
-        )
+        found = Given("parameters", parameters)
+        expected = "expected a list of names of the model, as ['upper.r', 'h']"
+        raise ModelError(expected, place="calibrate", found=found)
     dae = translate(robot, units=False)
     if f"{tool}.r" not in dae.vectors:
-        raise ModelError(f"calibrate: {dae.name} has no '{tool}.r', expected the position of a tool")
+        raise ModelError(f"{dae.name} has no '{tool}.r', expected the position of a tool", place="calibrate")
     if turning and not any(name in dae.vectors for name in orientations(tool)):
-        raise ModelError(
-            f"calibrate: found orientations R and no '{tool}.R' of {dae.name}, expected measurements without R"
-        )
+        missing = f"found orientations R and no '{tool}.R' of {dae.name}, expected measurements without R"
+        raise ModelError(missing, place="calibrate")
     known = {name: p for p in dae.flat.parameters for name in (p.name, *p.elements)}
     wrong = next((name for name in parameters if name not in known), None)
     if wrong is not None:
-        raise ModelError(
-            f"calibrate: {dae.name} has no parameter '{wrong}'{did_you_mean(wrong, known)}",
-            argument="parameters",
-        )
+        message = f"{dae.name} has no parameter '{wrong}'{did_you_mean(wrong, known)}"
+        raise ModelError(message, place="calibrate", argument="parameters")
     names = dict.fromkeys(
         n for name in parameters for n in (known[name].elements if name == known[name].name else [name])
     )

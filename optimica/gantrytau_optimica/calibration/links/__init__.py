@@ -1,1 +1,1 @@
-"""Closure equations of rods and arms, and how error models share their numbers."""
+"""Closure equations of rods and arms, and how error models share their parameters."""

@@ -11,18 +11,20 @@ An arm without turntables is one of (4.14), or of (4.13) where the plate cannot 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from gantrytau import Model, ModelError
+from gantrytau.border.checks import check_words
+from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import about, cross, skewed
 from gantrytau.language.self_description.rods import RodArm, RodTurntable, SingleRod
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods, read_nominal
 
 Orientation = Literal["local", "unit", "free"]
-ORIENTATIONS = ("local", "unit", "free")
+ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +127,8 @@ class ArmClosure(Record):
         places = {name: place for name, (place, _) in self.layout.items()}
         jacobian = np.zeros((len(q), len(self.lengths), max(place.stop for place in places.values())))
         for j, rod in enumerate(self.said.rods):
-            on_plate = self.vector_of(rod.plate_offset)
             places_of = frames.places(rod)
-            d = r + (on_plate if R is None else R @ on_plate) - places_of[0]
-            length = self.values[rod.length]
+            d, length = self._on_plate(rod, r, R) - places_of[0], self.values[rod.length]
             errors[:, j] = (np.einsum("ni,ni->n", d, d) - length**2) / (2 * self.lengths[j])
             g = d / self.lengths[j]
             for name, column in frames.columns(rod, g, R, places_of, -length / self.lengths[j]):
@@ -146,11 +146,14 @@ class ArmClosure(Record):
         """(B_j - A_j) / L_j^0 of all links, the derivatives of the closure errors by T, (N, m, 3)."""
         frames = _Frames(self, q)
         found = []
-        for j, rod in enumerate(self.said.rods):
-            on_plate = self.vector_of(rod.plate_offset)
-            d = r + (on_plate if R is None else R @ on_plate) - frames.places(rod)[0]
-            found.append(d / self.lengths[j])
+        for rod, length in zip(self.said.rods, self.lengths, strict=True):
+            found.append((self._on_plate(rod, r, R) - frames.places(rod)[0]) / length)
         return np.stack(found, axis=1)
+
+    def _on_plate(self, rod: SingleRod, r: np.ndarray, R: np.ndarray | None) -> np.ndarray:
+        """The joint B_j in the world, (N, 3)."""
+        on_plate = self.vector_of(rod.plate_offset)
+        return r + (on_plate if R is None else R @ on_plate)
 
 
 class _Frames:
@@ -259,6 +262,7 @@ def read_arms(
     orientations, and joints on the arm; 10, 24 and 38 of an F1 with quaternions. What the robot says is given is not.
     Raises ModelError for a model without `rods()`, another orientation, or a quaternion that is not unit where it has to be.
     """
+    check_words(read_arms, locals())
     return arms_of(read_nominal(robot), orientation, gains=gains)
 
 
@@ -266,10 +270,6 @@ def arms_of(
     nominal: NominalRods, orientation: Orientation = "local", *, gains: bool = False
 ) -> tuple[ArmClosure, ...]:
     """The same of a robot whose parameters are known."""
-    if orientation not in ORIENTATIONS:
-        raise ModelError(
-            f"orientation: found {orientation!r}, expected one of {', '.join(map(repr, ORIENTATIONS))}"
-        )
     columns = iter(range(len(nominal.arms), len(nominal.rods.joints)))
     found = []
     for cart, arm in enumerate(nominal.arms):
@@ -296,10 +296,8 @@ def _closure_of(
     for table in tables:
         norm = float(np.linalg.norm(values[table.orientation]))
         if orientation != "free" and abs(norm - 1.0) > 1e-9:
-            raise ModelError(
-                f"{table.orientation}: found a quaternion of length {norm:.6g}, expected 1; normalise it, or say "
-                "orientation='free'"
-            )
+            found = f"found a quaternion of length {norm:.6g}, expected 1; normalise it, or take "
+            raise ModelError(found, Given("orientation", "free"), place=table.orientation)
     free = [name for name in names if name not in nominal.rods.given]
     free += [f"{table.name}.gain" for table in tables] if gains else []
     lengths = np.array([float(values[rod.length]) for rod in rods])

@@ -9,6 +9,7 @@ so condition is not squared. Dressler (2012), section 5.4.
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.checks import array
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
 
 NOISE = 1e-5  # m, of a laser tracker at two metres
@@ -61,26 +62,16 @@ def checked_poses(
     arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """The measurements as arrays of floats, once their shapes and numbers are right; raises ModelError."""
-    q, r = np.asarray(q, dtype=float), np.asarray(r, dtype=float)
-    R = None if R is None else np.asarray(R, dtype=float)
+    q = array(arm.name, "q", q, (None, None))
+    r = array(arm.name, "r", r, (len(q), 3))
     columns = 1 + max([arm.cart, *arm.columns])
+    if len(q) == 0 or q.shape[1] < columns:
+        found = f"found q of {len(q)} x {q.shape[1]}, expected n x {columns}, n > 0"
+        raise ModelError(found, place=arm.name, argument="q")
     if not arm.turns:
-        R = None  # the plate of such an arm keeps its orientation, whatever was measured of it
-    elif R is None:
+        return q, r, None  # the plate of such an arm keeps its orientation, whatever was measured of it
+    if R is None:
         raise ModelError(
-            f"{arm.name}: found no orientations R, expected (N, 3, 3); the plate of this robot turns"
+            "found no orientations R, expected them as the plate turns", place=arm.name, argument="R"
         )
-    shapes = [array.shape for array in (q, r, *([] if R is None else [R]))]
-    expected = [(len(q), max(columns, q.shape[-1])), (len(q), 3), (len(q), 3, 3)][: len(shapes)]
-    if len(q) == 0 or shapes != expected:
-        raise ModelError(
-            f"{arm.name}: found q, r, R of the shapes {shapes}, expected (N, {columns}), (N, 3), (N, 3, 3), N > 0"
-        )
-    finite = np.isfinite(q).all(axis=1) & np.isfinite(r).all(axis=1)
-    finite &= True if R is None else np.isfinite(R).all(axis=(1, 2))
-    if not finite.all():
-        rows = ", ".join(map(str, np.flatnonzero(~finite)[:10]))
-        raise ModelError(
-            f"{arm.name}: found numbers that are not finite in rows {rows}; leave those poses out"
-        )
-    return q, r, R
+    return q, r, array(arm.name, "R", R, (len(q), 3, 3))

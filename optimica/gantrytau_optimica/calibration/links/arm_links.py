@@ -21,7 +21,7 @@ class ArmOverPoses:
         self.arm, self.q, self.r, self.R = arm, q, r, R
         self.start = arm.vector
         self.turns = [k for k, name in enumerate(arm.names) if ".rotation[" in name and name.endswith("[0]")]
-        self._slopes: tuple[bytes, dict[int, np.ndarray]] = (b"", {})
+        self._differences: tuple[bytes, dict[int, np.ndarray]] = (b"", {})
         self._known: tuple[bytes, np.ndarray, np.ndarray] = (b"", self.start, self.start)
 
     def moved(self, p: np.ndarray) -> ArmClosure:
@@ -53,14 +53,14 @@ class ArmOverPoses:
     def differences(self, p: np.ndarray) -> dict[int, np.ndarray]:
         """Derivatives of the errors by the actuators of the arm, (N, m), by columns of q."""
         key = p.tobytes()
-        if self._slopes[0] == key:
-            return self._slopes[1]
+        if self._differences[0] == key:
+            return self._differences[1]
         arm, found = self.moved(p), {}
         for column in (arm.cart, *arm.columns):
             step = STEP * (np.arange(self.q.shape[1]) == column)
             ends = [arm.errors(self.q + s * step, self.r, self.R) for s in (1.0, -1.0)]
             found[column] = (ends[0] - ends[1]) / (2 * STEP)
-        self._slopes = key, found
+        self._differences = key, found
         return found
 
 
@@ -91,24 +91,19 @@ class ArmLink(Record):
         """Orientations of the plate."""
         return self.poses.R
 
-    @property
-    def size(self) -> int:
-        """How many numbers it depends on."""
-        return self.poses.arm.count
-
     def error(self, p: np.ndarray) -> np.ndarray:
         """e, (N,) in m."""
         return self.poses.closure(p)[0][:, self.j]
 
     distance = error
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """de/dp, (N, size)."""
         return self.poses.closure(p)[1][:, self.j]
 
     def by_actuator(self, p: np.ndarray) -> dict[int, np.ndarray]:
         """de/dq, (N,), by columns of q."""
-        return {column: slopes[:, self.j] for column, slopes in self.poses.differences(p).items()}
+        return {column: derivatives[:, self.j] for column, derivatives in self.poses.differences(p).items()}
 
     def by_pose(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """de/dT and de/dphi, (N, 3) each."""
@@ -121,11 +116,6 @@ class ArmLink(Record):
     def told(self, p: np.ndarray) -> np.ndarray | None:
         """Derivatives of the numbers that are reported by those that are moved; None for the same."""
         return self.poses.told(p)
-
-    def at(self, rows: np.ndarray) -> "ArmLink":
-        """The link over some of the poses."""
-        here = self.poses
-        return self.over(here.q[rows], here.r[rows], None if here.R is None else here.R[rows])
 
     def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "ArmLink":
         """The link over other poses."""

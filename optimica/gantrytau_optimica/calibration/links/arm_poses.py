@@ -6,13 +6,14 @@ Newton over all poses at once, from poses near by: the plate moves by less than 
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
 from gantrytau import SolveError
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.links.forward import newton_steps
 
 STEPS = 12
 GOOD = 1e-9  # m, what is left of closure errors; steps are a thousand times larger where they do not converge
@@ -53,7 +54,7 @@ def poses_of(
             break
         there = None if R is None else R[open_rows]
         rows = pose_rows(arms, q[open_rows], r[open_rows], there)
-        step = _steps(rows, -errors[open_rows, :, None])[:, :, 0]
+        step = newton_steps(rows, -errors[open_rows])
         r[open_rows] += step[:, :3]
         if R is not None and there is not None:
             R[open_rows] = turned(there, step[:, 3:])
@@ -67,14 +68,6 @@ def poses_of(
     if R is not None:
         R[bad] = np.nan
     return r, R
-
-
-def _steps(rows: np.ndarray, errors: np.ndarray) -> np.ndarray:
-    """Newton steps; where the plate is not held the least step is as good as any."""
-    if rows.shape[1] == rows.shape[2]:
-        with suppress(np.linalg.LinAlgError):
-            return np.linalg.solve(rows, errors)
-    return np.linalg.pinv(rows) @ errors
 
 
 def tool_gain(
@@ -97,3 +90,25 @@ def tool_gain(
         gains.append((-part @ J, J))
         start += len(arm.links)
     return gains
+
+
+class ArmKinematics:
+    """Forward kinematics of calibrated arms, also of quaternions that are not unit: `fk(q, near)` by Newton."""
+
+    def __init__(self, arms: Sequence[ArmClosure], r: np.ndarray, R: np.ndarray):
+        self.arms = tuple(arms)
+        self.start_r, self._R = r, R
+        self.turns = True
+
+    def fk(self, q: Any, near: Any = None) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (N, 3) and orientations (N, 3, 3) for actuator positions (N, 6), from poses (r, R) near by.
+
+        near: by default a measured pose. NaN where links do not close.
+        """
+        q = np.asarray(q, dtype=float)
+        single, q = q.ndim == 1, np.atleast_2d(q)
+        r, R = near if near is not None else (self.start_r, self._R)
+        r, R = np.broadcast_to(r, (len(q), 3)), np.broadcast_to(R, (len(q), 3, 3))
+        found, turned = poses_of(self.arms, q, r, R, all_of_them=False)
+        turned = np.asarray(turned)
+        return (found[0], turned[0]) if single else (found, turned)

@@ -60,7 +60,7 @@ class Chain(Record):
         y = self.vector(p)
         return np.einsum("ij,ij->i", y, y) - p[0] ** 2
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """de/dp, (N, 7 or 10)."""
         y = self.vector(p)
         found = np.empty((len(y), self.size))
@@ -74,17 +74,13 @@ class Chain(Record):
             found[:, PLATE] = 2.0 * np.einsum("nji,nj->ni", self.R, y)
         return found
 
-    def by_cart(self, p: np.ndarray) -> np.ndarray:
-        """de/dq, (N,); of measured guideways with their mean direction."""
-        if self.points is None:
-            return -2.0 * (self.vector(p) @ p[ALONG])
-        around = self.q - self.q.mean()
-        along = around @ self.points / max(float(around @ around), 1e-300)
-        return -2.0 * (self.vector(p) @ (self.frame(p) @ along))
-
     def by_actuator(self, p: np.ndarray) -> dict[int, np.ndarray]:
-        """de/dq, (N,), by columns of q."""
-        return {self.cart: self.by_cart(p)}
+        """de/dq, (N,), by columns of q; of measured guideways with their mean direction."""
+        along = p[ALONG]
+        if self.points is not None:
+            around = self.q - self.q.mean()
+            along = self.frame(p) @ (around @ self.points / max(float(around @ around), 1e-300))
+        return {self.cart: -2.0 * (self.vector(p) @ along)}
 
     def by_pose(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """de/dT and de/dphi, phi a rotation vector in the world, (N, 3) each; zero where the plate does not turn."""
@@ -145,16 +141,11 @@ class Condensed:
     centre_q: float
     centre_r: np.ndarray
 
-    @property
-    def size(self) -> int:
-        """How many numbers the link has."""
-        return self.chain.size
-
     def error(self, p: np.ndarray) -> np.ndarray:
         """U theta(p), at most 31 rows."""
         return self.upper @ self._functions(p)
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """U dtheta/dp."""
         A, v = p[OFFSET] + self.centre_q * p[ALONG] - self.centre_r, p[ALONG]
         parts = [
@@ -238,18 +229,13 @@ class Weighted:
     chain: Any
     weights: np.ndarray
 
-    @property
-    def size(self) -> int:
-        """How many numbers the link has."""
-        return self.chain.size
-
     def error(self, p: np.ndarray) -> np.ndarray:
         """Weighted e, (N,)."""
         return self.weights * self.chain.error(p)
 
-    def slopes(self, p: np.ndarray) -> np.ndarray:
+    def jacobian(self, p: np.ndarray) -> np.ndarray:
         """Their derivatives, (N, 7 or 10)."""
-        return self.weights[:, None] * self.chain.slopes(p)
+        return self.weights[:, None] * self.chain.jacobian(p)
 
 
 def triangle(

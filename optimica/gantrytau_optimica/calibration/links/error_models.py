@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau import ModelError
+from gantrytau.border.refusal import Given
 from gantrytau.kinematics.rotations import mean_rotation, of_vector, turning
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
@@ -30,7 +31,6 @@ from gantrytau_optimica.calibration.links.guideway_points import between, straig
 from gantrytau_optimica.calibration.links.linear_start import linear_start
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods
 
-MODELS = (None, "parallel", 1, 2, 3, 4, 5)
 COMMON = "direction"  # of all guideways, by name
 ROLLS = 12  # trials for how a measured guideway lies about its own axis
 TURNS = 0.02  # rad; a plate that turns less than this does not hold B without a start value
@@ -68,37 +68,29 @@ def six_links(model: object, robot: NominalRods) -> bool:
 
 
 def check_model(model: object, robot: NominalRods, measurements: Measurements) -> None:
-    """ModelError if there is no such model, or the robot or the measurements lack what it needs."""
-    if isinstance(model, bool) or model not in MODELS:
-        raise ModelError(
-            f"calibrate: found model={model!r}, expected model=None, 'parallel', or 1 to 5",
-            argument="model",
-        )
+    """ModelError if the robot or the measurements lack what a model of the table needs."""
+
+    def refused(message: str, *remedy: str | Given) -> ModelError:
+        return ModelError(message, *remedy, place="calibrate", found=Given("model", model))
+
     if robot.turntables and model is not None:
-        raise ModelError(
-            f"calibrate: found model={model!r} for {robot.name}, expected model=None; those models have no turntables",
-            argument="model",
+        raise refused(
+            f"for {robot.name} expected ", Given("model", None), ": those models have no turntables"
         )
     if model in (3, 4, 5) and not robot.turns:
-        raise ModelError(
-            f"calibrate: found {robot.name} for model={model}, expected a robot with all six links; take "
-            "SixLinkGantryTau, or model=1",
-            argument="model",
-        )
+        message = f"expected a robot with all six links, not {robot.name}; take SixLinkGantryTau, or "
+        raise refused(message, Given("model", 1))
     if (six_links(model, robot) or robot.turntables) and measurements.R is None:
-        raise ModelError(
-            "calibrate: found measurements without R for six links, expected orientations of the plate; measure poses, or "
-            "take model=1",
-            argument="model",
+        message = (
+            "for six links expected measurements with R, orientations of the plate; measure poses, or take "
         )
-    if needs_rails(model) and (measurements.rails is None or len(measurements.rails) != len(robot.arms)):
-        found = "no rails" if measurements.rails is None else f"{len(measurements.rails)} rails"
-        raise ModelError(
-            f"calibrate: found measurements with {found} for model={model}, expected measured points of all "
-            f"{len(robot.arms)} guideways; give rails=[...] in Measurements, or take "
-            f"model={1 if model == 2 else 3}",
-            argument="model",
+        raise refused(message, Given("model", 1))
+    rails = 0 if measurements.rails is None else len(measurements.rails)
+    if needs_rails(model) and rails != len(robot.arms):
+        message = (
+            f"expected measured points of all {len(robot.arms)} guideways, not {rails}; give rails=[...] in "
         )
+        raise refused(f"{message}Measurements, or take ", Given("model", 1 if model == 2 else 3))
 
 
 def nominal_links(robot: NominalRods, data: Measurements, all_links: bool) -> list[ModelLink]:

@@ -1,6 +1,7 @@
 """Kinematics of calibrated models, those with measured guideways and directions of single links included."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,7 +112,7 @@ class CalibratedKinematics:
         """dq/dpose, (N, arms, 3), or (N, links, 6) with rotations about the world axes where the plate turns."""
         r, R, single = self._pose(r, R)
         q = np.atleast_2d(self.ik(r, R))
-        found = self._slopes(q, r, R)
+        found = self._by_pose(q, r, R)
         along = np.stack(
             [
                 np.einsum("ni,ni->n", self._vector(k, q, r, R), k.guideway.slope(q[:, k.arm]))
@@ -133,7 +134,7 @@ class CalibratedKinematics:
         """From the joint on the cart to that on the plate, (N, 3)."""
         return r + R @ link.on_plate - link.guideway.at(q[:, link.arm])
 
-    def _slopes(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
+    def _by_pose(self, q: np.ndarray, r: np.ndarray, R: np.ndarray) -> np.ndarray:
         """Half the derivatives of the closure errors by the pose, (N, links, 3 or 6)."""
         rows = []
         for link in self.links:
@@ -149,7 +150,7 @@ class CalibratedKinematics:
                 [(np.sum(self._vector(k, q, r, R) ** 2, axis=1) - k.length**2) / 2 for k in self.links],
                 axis=1,
             )
-            step = _solve(self._slopes(q, r, R), error)
+            step = newton_steps(self._by_pose(q, r, R), error)
             size = np.abs(step).max(axis=1)
             step = (
                 step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
@@ -204,8 +205,9 @@ def _straight_position(link: RodLink, joint: np.ndarray, place: np.ndarray, v: n
         return (p - np.sqrt(p * p - square * (np.sum(d * d, axis=1) - link.length**2))) / square
 
 
-def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    try:
-        return np.linalg.solve(matrix, right[..., None])[..., 0]
-    except np.linalg.LinAlgError:  # one singular pose must not stop the others
-        return np.einsum("nij,nj->ni", np.linalg.pinv(matrix), right)
+def newton_steps(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Steps (N, k) of least norm: where a pose is singular, or the plate is not held, these are as good as any."""
+    if matrices.shape[1] == matrices.shape[2]:
+        with suppress(np.linalg.LinAlgError):
+            return np.linalg.solve(matrices, right[..., None])[..., 0]
+    return (np.linalg.pinv(matrices) @ right[..., None])[..., 0]

@@ -1,13 +1,15 @@
-"""Links that share numbers."""
+"""Links that share parameters, and the least squares of their closure errors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.links.arm_links import ArmLink, ArmOverPoses
-from gantrytau_optimica.calibration.links.closure import Chain
+from gantrytau_optimica.calibration.links.closure import Chain, condense
+from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squares
 
 TAPE = 0.01  # m; combinations of numbers that data hold worse than a tape measure stay where they started
 
@@ -40,11 +42,45 @@ class Group(Record):
         """Closure errors of all poses, (N, links), in m2, or in m where there are turntables."""
         return np.column_stack([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
 
-    def slopes(self, x: np.ndarray, k: int) -> np.ndarray:
+    def link_jacobian(self, x: np.ndarray, k: int) -> np.ndarray:
         """Derivatives of the errors of chain k by the free numbers, (N, free)."""
         whole = np.zeros((len(self.chains[k].q), len(x)))
-        whole[:, self.places[k]] = self.chains[k].slopes(x[self.places[k]])
+        whole[:, self.places[k]] = self.chains[k].jacobian(x[self.places[k]])
         return whole[:, self.free]
+
+    @property
+    def count(self) -> int:
+        """How many closure errors there are."""
+        return sum(len(c.q) for c in self.chains)
+
+    def condensed(self, weights: np.ndarray | None = None) -> "Group":
+        """The group with links in few rows that leave the same sum of squares; weights (N,) of the poses, None for 1."""
+        chains: Any = tuple(condense(c, weights) for c in self.chains)
+        return replace(self, chains=chains)
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        """Closure errors of all links one after another, (m,)."""
+        return np.concatenate([c.error(x[p]) for c, p in zip(self.chains, self.places, strict=True)])
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives of the residuals by all parameters, (m, n)."""
+        blocks = []
+        for chain, places in zip(self.chains, self.places, strict=True):
+            small = chain.jacobian(x[places])
+            blocks.append(np.zeros((len(small), len(x))))
+            blocks[-1][:, places] = small
+        return np.vstack(blocks)
+
+    def prior_rows(self, noise: float) -> Prior:
+        """Rows of the prior beside closure errors of such a standard deviation."""
+        held = self.prior.values()
+        return Prior(list(self.prior), [m for m, _ in held], [noise / deviation for _, deviation in held])
+
+    def minimum(self, x: np.ndarray, noise: float, priors: Sequence[Prior] = (), **along: Any) -> Minimum:
+        """Least squares from x; noise: of a closure error, which weighs the prior; along: as of `least_squares`."""
+        rows = [self.prior_rows(noise), *priors]
+        scale = np.where(self.free, self.scale, 0.0)
+        return least_squares(self.residuals, self.jacobian, x, scale=scale, priors=rows, **along)
 
     def started(self, x: np.ndarray) -> "Group":
         """The same with other start values."""

@@ -16,10 +16,10 @@ from gantrytau_optimica.calibration.diagnostics.acceptance import (
     usable_rows,
 )
 from gantrytau_optimica.calibration.fitting.pose_residuals import fitted, started
-from gantrytau_optimica.calibration.fitting.rod_fit import read_prior
+from gantrytau_optimica.calibration.fitting.priors import read_prior
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.named.named_calibration import NamedCalibration
-from gantrytau_optimica.fitting.finding import Finding, agreeing, rows_in_words
+from gantrytau_optimica.fitting.finding import Finding, Rows, agreeing
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
 
@@ -50,8 +50,10 @@ def usable(
     there = np.isfinite(tool(measurements.q[rows], tool.nominal)[0]).all(axis=1)
     if not there.all():
         lost = rows[~there]
-        words = f"the nominal robot has no pose at q of {rows_in_words(lost)}; {agreeing(lost, 'they are')} left out"
-        findings.append(Finding("no pose", lost, words))
+        left = f"; {agreeing(lost, 'they are')} left out"
+        findings.append(
+            Finding("no pose", lost, ("the nominal robot has no pose at q of ", Rows(lost), left))
+        )
     return Usable(tool, rows[there], findings)
 
 
@@ -106,13 +108,8 @@ def _judged(found: NamedCalibration) -> list[Finding]:
     """Findings on a fit: outliers, convergence, undetermined numbers, size and structure of the residuals."""
     findings = [*outliers(found, found.stray_rows, "lie off by more than noise"), *not_converged(found)]
     if found.undetermined:
-        told = [
-            f"{name} follows from {', '.join(others)}"
-            if others
-            else f"nothing that was measured depends on {name}"
-            for name, others in found.dependent.items()
-        ]
-        words = f"data do not tell all numbers apart (rank {found.rank} of {len(found.names)}): {'; '.join(told)}; "
+        told = "; ".join(found.base.messages(found.names))
+        words = f"rank {found.rank} of {len(found.names)}: {told}; "
         words += f"they stay near their start values; {found.advice}"
         findings.append(Finding("undetermined", found.rows, words))
     typical = float(np.median(np.linalg.norm(found.residuals.poses(found.minimum.x)[:, :3], axis=1)))

@@ -9,16 +9,16 @@ import numpy as np
 
 from gantrytau import Model
 from gantrytau.kinematics import Kinematics
-from gantrytau_optimica.calibration.design.identifiability import dependencies
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.diagnostics.fitted_numbers import FittedNumbers
-from gantrytau_optimica.calibration.fitting.covariance import inverse_of, spread_by, undetermined
-from gantrytau_optimica.calibration.fitting.gauss_newton import Minimum
 from gantrytau_optimica.calibration.fitting.named_parameters import Named
-from gantrytau_optimica.calibration.fitting.pose_residuals import FRAME, PoseResiduals, strays
+from gantrytau_optimica.calibration.fitting.pose_residuals import PoseResiduals, strays
 from gantrytau_optimica.calibration.links.nominal_rods import with_numbers
 from gantrytau_optimica.calibration.report.report import Reported
+from gantrytau_optimica.fitting.covariance import spread_by
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
+from gantrytau_optimica.fitting.least_squares import Minimum
+from gantrytau_optimica.fitting.rank import BaseParameters, base_of_directions
 
 Array = np.ndarray
 
@@ -91,17 +91,17 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
-        return undetermined(self.minimum, self.names)
+        return self.minimum.undetermined(self.names)
 
-    @property
-    def dependent(self) -> dict[str, list[str]]:
-        """Numbers that data do not tell apart from others: each with those that take up its change."""
-        return dependencies(self.minimum.directions[self.rank :], self.residuals.scale, self.names)
+    @cached_property
+    def base(self) -> BaseParameters:
+        """What data determine in place of parameters that they do not tell apart."""
+        return base_of_directions(self.minimum.directions[self.rank :], self.residuals.scale)
 
     @cached_property
     def _covariance(self) -> Array:
         residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
-        J = np.swapaxes(residuals.slopes(x) * residuals.weights[:, None, None] ** 2, 1, 2)
+        J = np.swapaxes(residuals.jacobian(x) * residuals.weights[:, None, None] ** 2, 1, 2)
         R = residuals.frame(x)[0]
         roots = np.broadcast_to(np.eye(3), (len(J), 3, 3)) if data.spreads is None else R @ data.spreads
         worse = np.sqrt(np.sum(roots**2, axis=(1, 2)) / 3)[:, None, None]
@@ -109,14 +109,14 @@ class NamedCalibration(Reported, FittedNumbers):
         columns = [moved.transpose(1, 0, 2).reshape(len(x), -1)]
         if data.shared is not None:
             columns.append(np.einsum("nji,nik->jk", J[:, :, :3], R @ data.shared))
-        pulled = self.minimum.slopes[len(self.minimum.slopes) - len(residuals.prior) :] / residuals.scale
+        pulled = self.minimum.jacobian[len(self.minimum.jacobian) - len(residuals.prior) :] / residuals.scale
         for row, (_, deviation) in zip(pulled, residuals.prior.values(), strict=True):
             columns.append((row * np.abs(row).max() * deviation)[:, None])
-        return spread_by(inverse_of(self.minimum, residuals.scale), *columns)
+        return spread_by(self.minimum.inverse, *columns)
 
     @property
     def advice(self) -> str:
-        framed = any(set(others) & set(FRAME) for others in self.dependent.values())
+        framed = any("frame." in words for words in self.base.words(self.names))
         base = ", or measure in the base of the robot, frame='base'" if framed else ""
         return f"leave them out of parameters=, measure other poses, or give prior={{name: deviation}}{base}"
 
@@ -145,7 +145,7 @@ class NamedCalibration(Reported, FittedNumbers):
     @cached_property
     def expected(self) -> Array:
         """The error of the tool to be expected at the fitted poses, by how sure parameters are, (N,) in m."""
-        J = self.residuals.slopes(self.minimum.x)[:, :3]
+        J = self.residuals.jacobian(self.minimum.x)[:, :3]
         return np.sqrt(np.einsum("nij,jk,nik->n", J, self._covariance, J))
 
     def link_errors(self) -> list[tuple[str, Array, Array]]:
@@ -158,7 +158,7 @@ class NamedCalibration(Reported, FittedNumbers):
     def residual_series(self) -> list[ResidualSeries]:
         residuals, x, data = self.residuals, self.minimum.x, self.residuals.data
         weights = residuals.weights[:, None]
-        left, J = residuals.poses(x) * weights, residuals.slopes(x) * weights[..., None]
+        left, J = residuals.poses(x) * weights, residuals.jacobian(x) * weights[..., None]
         noise: list[Any] = [None] * 3
         if data.spreads is not None and data.deviation is not None:
             R = residuals.frame(x)[0]

@@ -1,7 +1,6 @@
 """The report of a calibration: one HTML page, complete in itself, and the same numbers as JSON."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -12,6 +11,7 @@ import numpy as np
 
 from gantrytau import Description, ModelError
 from gantrytau.describing.record import Record
+from gantrytau.whole_files import replacing
 from gantrytau_optimica.calibration.diagnostics.device_frames import Motion
 from gantrytau_optimica.calibration.report.described_calibration import calibration_described
 from gantrytau_optimica.calibration.report.report_page import html_report
@@ -190,29 +190,19 @@ def write_report(found: Any, path: Path, about: About | None = None) -> Path:
         else path.with_name(path.name.removesuffix(".json") + ".html")
     )
     numbers = report_numbers(found, about)
-    texts = {
-        page: html_report(numbers),
-        page.with_suffix(".json"): json.dumps(numbers, indent=1, allow_nan=False),
-    }
-    fresh = {target: target.with_name(f".{target.name}.{os.getpid()}") for target in texts}
+    page_text, data = html_report(numbers), json.dumps(numbers, indent=1, allow_nan=False)
     try:
-        for target in texts:
-            if target.is_dir():
-                raise IsADirectoryError(f"{target} is a directory")
+        if page.is_dir():
+            raise IsADirectoryError(f"{page} is a directory")
         page.parent.mkdir(parents=True, exist_ok=True)
-        for target, text in texts.items():
-            fresh[target].write_text(text, encoding="utf-8")
-        for target in texts:
-            fresh[target].replace(target)
+        with replacing(page) as html_file, replacing(page.with_suffix(".json")) as json_file:
+            html_file.write_text(page_text, encoding="utf-8")
+            json_file.write_text(data, encoding="utf-8")
     except OSError as error:
         raise ModelError(
             f"report: found that {page} cannot be written ({error}), expected a file name in a folder that can be written "
             "to; what was there is as before"
         ) from None
-    finally:
-        for temporary in fresh.values():
-            if temporary.exists():
-                temporary.unlink()
     return page
 
 

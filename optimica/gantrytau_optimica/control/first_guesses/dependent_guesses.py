@@ -13,8 +13,8 @@ from gantrytau_optimica.control.first_guesses.completion import Completion, Driv
 Guess = Callable[[np.ndarray], np.ndarray]
 LEAST_ROOT = 0.1  # of its largest value on the guess: roots are kept away from zero, where forces explode
 MOST_PLACES = 120  # at which Newton's method completes a guess; between them it is drawn straight
-MOST_KEPT = 4  # answers that are remembered: at places, and beside them for slopes
-SLOPE = 1e-4  # of the horizon: between values of which slopes of guesses are taken
+MOST_KEPT = 4  # answers that are remembered: at places, and beside them for derivatives
+APART = 1e-4  # of the horizon: between values of which derivatives of guesses are taken
 
 
 def dependent_guesses(
@@ -84,8 +84,8 @@ def _completed(
     if along is None:
         return _in_closed_form(built, phase, symbols, own, span)
     found = {s.name: own.get(s.symbol.name(), guess) for s, guess in along.guesses()}
-    for signal, slope in zip(moving.rates, along.speeds, strict=True):
-        found[signal.name] = own.get(signal.symbol.name(), _Slope(slope, span[1] - span[0]))
+    for signal, speed in zip(moving.rates, along.speeds, strict=True):
+        found[signal.name] = own.get(signal.symbol.name(), _GuessedRate(speed, span[1] - span[0]))
     return found | {s.name: speeds[s.symbol.name()] for s in phase.states if s.symbol.name() in speeds}
 
 
@@ -101,7 +101,7 @@ class _Whole:
     moving: Driven
 
     def turning(self) -> dict[str, Guess]:
-        """Speeds that are no rates of states, as angular velocities are, from the slopes of the other states."""
+        """Speeds that are no rates of states, as angular velocities are, from the rates of the other states."""
         phase, places = self.phase, {s.symbol.element_hash() for s in self.phase.states}
         odes = phase.ode.elements()
         direct = {e.element_hash() for e in odes} & places
@@ -126,10 +126,10 @@ class _Whole:
         fixed, chosen = ({s.name for s in part} for part in (moving.rates, (*moving.inputs, *turning)))
         unknowns = [*(a for a in phase.algebraics if a.name not in fixed), *moving.inputs, *turning]
         known = [s for s in (*phase.states, *phase.inputs, *phase.courses) if s.name not in chosen]
-        slopes = ca.SX.sym("slope", len(moved))
+        rates = ca.SX.sym("rate", len(moved))
         completion = Completion(
-            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved), 0] - slopes)),
-            ca.vertcat(problem.time, *(s.symbol for s in (*known, *moving.rates)), slopes),
+            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved), 0] - rates)),
+            ca.vertcat(problem.time, *(s.symbol for s in (*known, *moving.rates)), rates),
             ca.vertcat(*(s.symbol for s in unknowns)),
             {
                 k: self._numbered(self.built.closed[s.name])
@@ -181,7 +181,7 @@ def _driven(built: Built, phase: Phase, own: Mapping[str, Guess]) -> Driven:
 
 
 @dataclass(frozen=True)
-class _Slope:
+class _GuessedRate:
     """The rate of a guess over a time of `span` seconds."""
 
     guess: Guess
@@ -189,7 +189,7 @@ class _Slope:
 
     def __call__(self, fraction: np.ndarray) -> np.ndarray:
         fraction = np.atleast_1d(np.asarray(fraction, dtype=float))
-        before, after = np.clip(fraction - SLOPE, 0.0, 1.0), np.clip(fraction + SLOPE, 0.0, 1.0)
+        before, after = np.clip(fraction - APART, 0.0, 1.0), np.clip(fraction + APART, 0.0, 1.0)
         return (self.guess(after) - self.guess(before)) / (after - before) / self.span
 
 
@@ -197,7 +197,7 @@ class _Slope:
 class _Along:
     """All unknowns along the guess; remembers the last answers, for which their parts ask one after another.
 
-    known: guesses of what is known; speeds: those whose slopes are known; begin: all that where the model starts.
+    known: guesses of what is known; speeds: those whose derivatives are known; begin: all that where the model starts.
     """
 
     completion: Completion
@@ -232,7 +232,7 @@ class _Along:
         shares = fraction[order]
         start, stop = self.span
         rows = [start + (stop - start) * shares, *(guess(shares) for guess in self.known)]
-        rows += [_Slope(guess, stop - start)(shares) for guess in self.speeds]
+        rows += [_GuessedRate(guess, stop - start)(shares) for guess in self.speeds]
         values = self.completion.along(self.begin, np.array(rows, dtype=float).T)
         lost = np.isnan(values).any(axis=1)
         if np.any(lost):

@@ -192,8 +192,9 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
     if not times and not numbers:
         what = f"none of the variables of {component}" if component else "no variable of the problem"
         raise ModelError(
-            f"guess: the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the "
-            "same model, or write guess={'component': solution} with the component that it is of",
+            f"the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the same "
+            "model, or write guess={'component': solution} with the component that it is of",
+            place="guess",
             argument="guess",
         )
     found: dict[str, Any] = {}

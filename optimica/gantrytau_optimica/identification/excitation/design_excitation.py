@@ -48,11 +48,7 @@ def design_excitation(
     Raises ModelError for what does not fit, SolveError where no motion keeps the limits. Swevers et al. (1997).
     """
     check_words(design_excitation, locals())
-    for name, value in dict(duration=duration, period=period).items():
-        if value is not None:
-            number("design_excitation", name, value, above=PERIOD)
-    for name, value, least in (("harmonics", harmonics, 2), ("starts", starts, 1), ("seed", seed, 0)):
-        whole("design_excitation", name, value, least=least)
+    _check_numbers(duration, period, harmonics=harmonics, starts=starts, seed=seed)
     dae = translate(robot)
     if TOOL[0] not in dae.variables:
         raise ModelError(
@@ -108,6 +104,15 @@ def _best(
             "forces hold the robot at rest in the whole box, and whether it is within reach"
         )
     return min(kept, key=lambda each: each[0])[1:]
+
+
+def _check_numbers(duration: float, period: float | None, **counts: int) -> None:
+    number("design_excitation", "duration", duration, above=PERIOD)
+    if period is not None:
+        number("design_excitation", "period", period, above=PERIOD)
+    least = dict(harmonics=2, starts=1, seed=0)
+    for name, value in counts.items():
+        whole("design_excitation", name, value, least=least[name])
 
 
 def _begins(limits: ExcitationLimits, harmonics: int, seed: int, starts: int) -> list[np.ndarray]:

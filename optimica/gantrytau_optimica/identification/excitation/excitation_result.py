@@ -11,7 +11,7 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.excitation.fourier_series import FourierSeries
 from gantrytau_optimica.identification.excitation.motion_regressor import MotionRegressor
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
-from gantrytau_optimica.procedure.documents.rapid import check_program
+from gantrytau_optimica.procedure.documents.rapid import RapidOptions
 
 STEP = 0.1  # s between two targets of a program
 
@@ -80,7 +80,7 @@ class Excitation(Record):
         Carts are the axes of the robot. It goes slowly to the first target, and then through all without stopping.
         Raises ModelError for names that RAPID does not take and steps that are no multiple of a row.
         """
-        check_program(name=name)
+        RapidOptions(name)
         period = self.log.period
         every = round(step / period) if np.isfinite(step) else 0
         if every < 1 or abs(every * period - step) > 1e-6 * period:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.covariance import named_covariance
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
-from gantrytau_optimica.fitting.named_covariance import named_covariance
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
 from gantrytau_optimica.identification.friction.figures import draw_friction

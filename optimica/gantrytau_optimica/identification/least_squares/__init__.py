@@ -1,1 +1,1 @@
-"""Linear least squares: what columns determine, within limits of parameters and conditions on several together."""
+"""Linear least squares of forces, within limits of parameters and conditions on several together."""

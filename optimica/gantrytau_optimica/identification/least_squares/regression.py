@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau_optimica.identification.least_squares.base_parameters import BaseParameters, base_parameters
+from gantrytau_optimica.fitting.rank import BaseParameters, base_parameters
 from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits, within
 

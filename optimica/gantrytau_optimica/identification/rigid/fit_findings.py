@@ -8,6 +8,7 @@ import numpy as np
 from gantrytau.dae import Dae
 from gantrytau.kinematics.kinematics import driven_joints
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.rank import not_told_apart
 from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -51,7 +52,7 @@ def usable_parts(
         where = f"log {number}: " if len(logs) > 1 else ""
         ends = "; here they are put in again" if mended is not log else ""
         findings += [
-            replace(f, message=f"{where}{f.message}{ends if f.kind == 'lost rows' else ''}") for f in told
+            replace(f, sentence=f"{where}{f.message}{ends if f.kind == 'lost rows' else ''}") for f in told
         ]
     if not kept:
         raise IdentificationError(
@@ -71,7 +72,7 @@ def beside_robot(
         return []
     kinds = {one.kind for one in known}
     return [
-        replace(f, message=f"log {number}: {f.message}" if len(logs) > 1 else f.message)
+        replace(f, sentence=f"log {number}: {f.message}" if len(logs) > 1 else f.message)
         for number, log in enumerate(logs)
         for f in check_motion(dae, log)
         if f.kind not in kinds
@@ -102,13 +103,12 @@ def fit_findings(
     silent = found.base.silent(names)
     if silent:
         words = (
-            f"no force of this motion depends on {', '.join(silent)}, which stay as in the robot, "
-            "or as close as a body can; move them"
+            f"{not_told_apart(silent, ())}, which stay as in the robot, or as close as a body can; move them"
         )
         findings.append(Finding("silent", np.arange(0), words))
-    together = found.base.words(names)
+    together = found.base.messages(names)[bool(silent) :]
     if together:
-        words = f"only {'; '.join(together)} are determined, not the parts; what follows the first keeps its nominal value"
+        words = f"{'; '.join(together)}; what follows the first in each sum keeps its nominal value"
         findings.append(Finding("base parameters", np.arange(0), words))
     hardly = [n for n in weak if n not in silent]
     if hardly:

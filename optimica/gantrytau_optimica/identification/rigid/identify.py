@@ -72,12 +72,9 @@ def identify(
     that the model declares, no body without a density (pseudo-inertia). cutoff: Hz, of the zero-phase filter of both
     sides; minimum_speed: m/s or rad/s, below which a joint's rows do not count; twice Stribeck's keeps that out of the
     other laws. holdout: the part that judges a fit of the rest. Gautier (1991); Dressler (2012), section 6.1.
-
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """
-    check_words(identify, locals())
-    number("identify", "cutoff", cutoff, above=0.0)
-    number("identify", "minimum_speed", minimum_speed, least=0.0)
+    _check_policy(friction, holdout, cutoff, minimum_speed)
     dae = robot if isinstance(robot, Dae) else translate(robot)
     logs = [log] if isinstance(log, MotionLog) else list(log)
     coordinates, forces = drives(dae)
@@ -110,6 +107,12 @@ def identify(
     answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, diagnostics=left)
     answer = replace(answer, findings=_noticed(findings, doubts, left.findings))
     return replace(answer, model_values=held | dict(answer.model_values))
+
+
+def _check_policy(friction: Any, holdout: Any, cutoff: float, minimum_speed: float) -> None:
+    check_words(identify, dict(friction=friction, holdout=holdout))
+    number("identify", "cutoff", cutoff, above=0.0)
+    number("identify", "minimum_speed", minimum_speed, least=0.0)
 
 
 def _noticed(

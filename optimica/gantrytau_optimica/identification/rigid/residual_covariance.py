@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gantrytau_optimica.fitting.coloured_noise import averaged_spectrum, product_covariance
+from gantrytau_optimica.fitting.covariance import averaged_spectrum, product_covariance
 
 BAND = 5.0  # parts of the cutoff over which the spectrum is averaged
 

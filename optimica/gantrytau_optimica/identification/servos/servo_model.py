@@ -9,9 +9,9 @@ import numpy as np
 
 from gantrytau.answers.linear_systems.state_space import StateSpace
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.covariance import named_covariance
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
-from gantrytau_optimica.fitting.named_covariance import named_covariance
 from gantrytau_optimica.identification.servos.figures import draw_steps
 from gantrytau_optimica.identification.servos.servo_fit import corner, response
 from gantrytau_optimica.identification.servos.step_response import StepResponse

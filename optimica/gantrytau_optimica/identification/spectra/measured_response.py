@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
-from gantrytau.answers.linear_systems.linear_system import check_period
-from gantrytau.border.checks import whole
+from gantrytau.border.checks import number, whole
 from gantrytau.describing.record import Record
 from gantrytau_optimica.identification.spectra.sampled_motion import sampled_motion
 
@@ -51,7 +50,7 @@ def measured_response(u: ArrayLike, y: ArrayLike, *, period: float, blocks: int 
     """
     place = "measured_response"
     whole(place, "blocks", blocks, least=2)
-    check_period(place, period)
+    number(place, "period", period, unit="s", above=0)
     u, y = sampled_motion(place, u, y, least=SHORTEST * blocks)
     inputs = u.shape[1]
     if blocks < 2 * inputs:

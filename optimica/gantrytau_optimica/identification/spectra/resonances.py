@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError
-from gantrytau.answers.linear_systems.linear_system import check_period
 from gantrytau.border.checks import number
 
 FINER = 16  # points of the spectrum for each that the samples tell
@@ -26,7 +25,7 @@ def resonances(
     """
     from scipy.signal import find_peaks
 
-    check_period("resonances", period)
+    number("resonances", "period", period, unit="s", above=0)
     number("resonances", "share", share, above=0.0, below=1.0)
     y = np.asarray(y, dtype=float)
     columns = y[:, None] if y.ndim == 1 else y

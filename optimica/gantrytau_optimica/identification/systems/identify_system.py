@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gantrytau import ModelError, StateSpace
-from gantrytau.answers.linear_systems.linear_system import check_period
-from gantrytau.border.checks import whole
+from gantrytau.border.checks import number, whole
 from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.fitting.diagnostics import Diagnostics, ResidualSeries, diagnose
 from gantrytau_optimica.fitting.finding import Finding
@@ -108,7 +107,7 @@ def identify_system(
     """
     whole("identify_system", "block_rows", block_rows, least=2)
     whole("identify_system", "order", order, least=1)
-    check_period("identify_system", period)
+    number("identify_system", "period", period, unit="s", above=0)
     u, y = sampled_motion("identify_system", u, y, least=2)
     _check_sizes(u, y, order, block_rows)
     sizes = [np.linalg.norm(x - x.mean(axis=0), axis=0) / np.sqrt(len(x)) for x in (u, y)]

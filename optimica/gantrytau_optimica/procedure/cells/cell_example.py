@@ -1,6 +1,7 @@
 """The file of a cell as an example to be filled in, for each kind of robot."""
 
 from gantrytau import ModelError, did_you_mean
+from gantrytau.border.refusal import Given
 
 CELL = """\
 # A robot cell to be calibrated. Make this file your own, then: gantrytau calibrate cell.toml
@@ -115,17 +116,20 @@ def cell_example(kind: str | None = None, robot: str | None = None) -> str:
     """
     if kind is not None and kind.lower() not in KINDS:
         raise ModelError(
-            f"cell_example: kind {kind}: there is no such example{did_you_mean(kind.lower(), KINDS)}",
-            argument="kind",
+            f"there is no such example{did_you_mean(kind.lower(), KINDS)}",
+            place="cell_example",
+            found=Given("kind", kind),
         )
     if robot is None:
         return CELL.format(**KINDS[(kind or "l1").lower()])
     name = robot.partition("(")[0]
     if kind is None and name not in OF_MODELS:
         raise ModelError(
-            f"cell_example: robot {robot}: expected {', '.join(OF_MODELS)}, or a kind beside it, as kind='six', for limits, "
-            "device and home to begin with",
-            argument="robot",
+            f"expected {', '.join(OF_MODELS)}, or a kind beside it, as ",
+            Given("kind", "six"),
+            ", for limits, device and home to begin with",
+            place="cell_example",
+            found=Given("robot", robot),
         )
     known = KINDS[kind.lower() if kind else OF_MODELS[name]]
     named = f'model = "{robot}"'

@@ -3,17 +3,19 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gantrytau import GantryTauError, Model, ModelError, did_you_mean, kinematics, read_toml, with_setting
+from gantrytau import Model, ModelError, kinematics, read_toml, with_setting
 from gantrytau.border.named import named
+from gantrytau.border.refusal import told
 from gantrytau.border.schema import Value, at, read_table
 from gantrytau.describing.record import Record
 from gantrytau.kinematics import Limits
 from gantrytau_optimica.calibration.devices.cameras import single_camera, stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import Device, LaserTracker, TMac
-from gantrytau_optimica.procedure.documents.rapid import check_program
+from gantrytau_optimica.procedure.documents.rapid import RapidOptions
 
 POINT = Value("m", ((3,),))
 ROTATION = Value("1", ((3, 3),))
@@ -43,8 +45,8 @@ LIMITS = {
     "turn_margin": TURN,
     "angle_margin": TURN,
     "clearance": ERROR,
-    "obstacles": Value("bodies"),
-    "plate": Value("bodies"),
+    "obstacles": Value("table", ((None,),)),
+    "plate": Value("table", ((None,),)),
 }
 BAR = {"start": POINT, "end": POINT, "radius": LENGTH}
 OBSTACLES = {
@@ -88,7 +90,9 @@ PROGRAM = {
     "trigger": TEXT,
     "tool": TEXT,
 }
-TABLES = ("robot", "values", "goal", "limits", "device", "plan", "program")
+TABLES: dict[str, Value] = dict.fromkeys(
+    ("robot", "values", "goal", "limits", "device", "plan", "program"), Value("table")
+)
 
 
 Robot = Model | Callable[[str], Model]
@@ -140,20 +144,14 @@ def read_cell(path: str | Path, robot: Robot | None = None) -> Cell:
     file, for all that it cannot be.
     """
     file = Path(path)
-    table = read_toml(file)
     whole = f"{file}: "
-    for name in table:
-        if name not in TABLES:
-            raise ModelError(f"{whole}[{name}]: there is no such table{did_you_mean(name, TABLES)}")
-    for name in ("robot", "goal", "device"):
-        if name not in table:
-            raise ModelError(
-                f"{whole}found no table [{name}], expected one; `gantrytau calibrate --example` prints a whole file"
-            )
+    table = read_table(whole, read_toml(file), TABLES, ("robot", "goal", "device"))
     own = read_table(f"{whole}robot", table["robot"], ROBOT, ("model", "tape"))
     name, values = absolute_name(own["model"], file), _values(f"{whole}values", table.get("values", {}))
     goal = read_table(f"{whole}goal", table["goal"], GOAL, ("error",))
-    model = robot if isinstance(robot, Model) else _found(f"{whole}robot.model", name, robot or robot_by_name)
+    model = robot
+    if not isinstance(model, Model):
+        model = told(f"{whole}robot.model", partial(model or robot_by_name, name))
     device, frame = _device(f"{whole}device", table["device"])
     return Cell(
         file=file,
@@ -184,76 +182,47 @@ def robot_by_name(name: str) -> Model:
 
     Raises ModelError where there is none.
     """
-    try:
-        made = named(name, Path.cwd(), LIBRARY)
-    except (GantryTauError, ImportError, OSError, ValueError, KeyError, AttributeError, TypeError) as error:
-        raise ModelError(
-            f"found '{name}', which cannot be made ({error}), expected a model; give it itself, robot="
-        ) from error
+    made = named(name, Path.cwd(), LIBRARY)
     if not isinstance(made, Model):
-        raise ModelError(
-            f"found '{name}', which is no model, expected one, as GantryTau(L1); give it itself, robot="
-        )
+        raise ModelError(f"found '{name}', which is no model, expected one, as GantryTau(L1)")
     return made
-
-
-def _found(place: str, name: str, robot: Callable[[str], Model]) -> Model:
-    try:
-        return robot(name)
-    except GantryTauError as error:
-        raise ModelError(f"{place}: {error}") from error
 
 
 def _with_values(place: str, model: Model, values: Mapping[str, Any]) -> Model:
     for name, value in values.items():
-        try:
-            model = with_setting(model, name, value)
-        except ModelError as error:
-            raise ModelError(f"{place}: {error}") from error
+        model = told(place, partial(with_setting, model, name, value))
     return model
 
 
 def _values(place: str, table: Any) -> dict[str, Any]:
     """Numbers and vectors by the names of parameters; lengths may bring their unit."""
-    if not isinstance(table, Mapping):
-        raise ModelError(f"{place}: found {table!r}, expected a table, [values]")
     any_value = Value("m,rad", ((), (3,), (4,), (3, 3)))
-    found = {}
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            raise ModelError(
-                f'{at(place, name)}: found a table, expected a number; write the name in quotes, as "arms[0].length" = 2.05'
-            )
-        found[name] = any_value.read(at(place, name), value)
-    return found
+    if nested := next((name for name, value in table.items() if isinstance(value, Mapping)), None):
+        raise ModelError(
+            f'{at(place, nested)}: found a table, expected a number; write the name in quotes, as "arms[0].length" = 2.05'
+        )
+    return {name: any_value.read(at(place, name), value) for name, value in table.items()}
 
 
 def _limits(place: str, table: Any) -> Limits:
     values = read_table(place, table, LIMITS)
     for name, kinds in (("obstacles", OBSTACLES), ("plate", {"capsule": OBSTACLES["capsule"]})):
         values[name] = _bodies(f"{place}.{name}", values.get(name, []), kinds)
-    return _made(place, Limits, values)
+    return told(place, lambda: Limits(**values))
 
 
 def _bodies(place: str, entries: Any, kinds: Mapping[str, Any]) -> list[Any]:
-    if not isinstance(entries, list):
-        raise ModelError(
-            f"{place}: found {entries!r}, expected a table for each, [[{place.rpartition(': ')[2]}]]"
-        )
     found = []
     for k, entry in enumerate(entries):
         make, values = _of_a_kind(f"{place}[{k}]", entry, kinds)
-        found.append(_made(f"{place}[{k}]", make, values))
+        found.append(told(f"{place}[{k}]", partial(make, **values)))
     return found
 
 
 def _program(place: str, table: Any) -> dict[str, Any]:
     """Options of the robot program, all of which RAPID takes."""
     values = read_table(place, table, PROGRAM)
-    try:
-        check_program(**values)
-    except ModelError as error:
-        raise ModelError(f"{place.removesuffix('program')}{error}") from error
+    told(place.removesuffix(": program"), lambda: RapidOptions(**values))
     return values
 
 
@@ -261,26 +230,14 @@ def _device(place: str, table: Any) -> tuple[Device, Any]:
     """The device, and the frame in which it measures."""
     make, values = _of_a_kind(place, table, DEVICES)
     frame = values.pop("frame", "fitted")
-    return _made(place, make, values), frame
+    return told(place, lambda: make(**values)), frame
 
 
 def _of_a_kind(place: str, table: Any, kinds: Mapping[str, Any]) -> tuple[Callable[..., Any], dict[str, Any]]:
     """What makes the kind that is named, and what the table says of it; the kind may be left out where there is only one."""
-    if not isinstance(table, Mapping):
-        raise ModelError(f"{place}: found {table!r}, expected a table")
     kind = Value("text", words=tuple(kinds))
-    first = next(iter(kinds))
     if "kind" not in table and len(kinds) > 1:
         raise ModelError(f"{at(place, 'kind')}: found nothing, expected {kind.expected()}")
-    chosen = kind.read(at(place, "kind"), table.get("kind", first))
-    make, keys, needed = kinds[chosen]
+    make, keys, needed = kinds[kind.read(at(place, "kind"), table.get("kind", next(iter(kinds))))]
     values = read_table(place, table, {"kind": kind, **keys}, needed)
     return make, {key: value for key, value in values.items() if key != "kind"}
-
-
-def _made(place: str, make: Callable[..., Any], values: dict[str, Any]) -> Any:
-    """What a class makes of values; its complaint with the place in the file."""
-    try:
-        return make(**values)
-    except ModelError as error:
-        raise ModelError(f"{place}: {error}") from error

@@ -84,55 +84,19 @@ def _obstacles(axis: Any, obstacles: Sequence[Obstacle], box: np.ndarray, across
 
 
 def _poses(axis: Any, plan: PosePlan, across: int, up: int) -> None:
-    way = _way(plan)
-    axis.plot(
-        way[:, across],
-        way[:, up],
-        color="tab:blue",
-        linewidth=0.6,
-        alpha=0.7,
-        label="way of the tool",
-        zorder=2,
-    )
-    if len(plan.unseen):
-        axis.plot(
-            *plan.unseen[:, [across, up]].T,
-            "x",
-            color="tab:orange",
-            markersize=4,
-            label="safe, but not visible",
-            zorder=3,
-        )
     passed = ~plan.measured
     passed[[0, -1]] = False
-    if passed.any():
-        axis.plot(
-            *plan.r[passed][:, [across, up]].T,
-            "o",
-            mfc="white",
-            mec="tab:blue",
-            markersize=4,
-            label="only passed",
-            zorder=4,
-        )
-    if len(plan.lost):
-        axis.plot(
-            *plan.lost[:, [across, up]].T,
-            "v",
-            color="tab:red",
-            markersize=5,
-            label="not reached, replaced",
-            zorder=4,
-        )
     at = plan.r[plan.measured]
-    axis.plot(
-        *at[:, [across, up]].T,
-        "o",
-        color="tab:blue",
-        markersize=5,
-        label="to measure, numbered as in poses.csv",
-        zorder=5,
-    )
+
+    def marks(points: np.ndarray, style: str, label: str, **how: Any) -> None:
+        if len(points):
+            axis.plot(*points[:, [across, up]].T, style, label=label, **how)
+
+    marks(_way(plan), "-", "way of the tool", color="tab:blue", linewidth=0.6, alpha=0.7, zorder=2)
+    marks(plan.unseen, "x", "safe, but not visible", color="tab:orange", markersize=4, zorder=3)
+    marks(plan.r[passed], "o", "only passed", mfc="white", mec="tab:blue", markersize=4, zorder=4)
+    marks(plan.lost, "v", "not reached, replaced", color="tab:red", markersize=5, zorder=4)
+    marks(at, "o", "to measure, numbered as in poses.csv", color="tab:blue", markersize=5, zorder=5)
     _numbers(axis, plan.numbers[plan.measured], at[:, [across, up]])
     axis.plot(*plan.r[0, [across, up]], "s", color="black", markersize=7, label="home", zorder=5)
 
@@ -184,13 +148,8 @@ def _device(axis: Any, plan: PosePlan, box: np.ndarray, across: int, up: int) ->
     arrow = dict(arrowstyle="-|>", color="tab:purple", linewidth=1.5)
     axis.annotate("", middle + 0.98 * reach * away, middle + 0.82 * reach * away, arrowprops=arrow, zorder=6)
     if up == 1:
-        axis.plot(
-            [],
-            [],
-            "-",
-            color="tab:purple",
-            label=f"to the {name} at {np.round(plan.settings['device_r'], 2).tolist()} m",
-        )
+        label = f"to the {name} at {np.round(plan.settings['device_r'], 2).tolist()} m"
+        axis.plot([], [], "-", color="tab:purple", label=label)
 
 
 def _words(plan: PosePlan) -> str:

@@ -13,7 +13,7 @@ from gantrytau import ModelError
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.procedure.documents.figures import draw_plan
 from gantrytau_optimica.procedure.documents.plan_page import html_page
-from gantrytau_optimica.procedure.documents.rapid import OPERATOR, rapid_program
+from gantrytau_optimica.procedure.documents.rapid import RapidOptions, rapid_program
 from gantrytau_optimica.procedure.monte_carlo import Trials
 from gantrytau_optimica.procedure.plan_acceptance import PlanVerdict
 from gantrytau_optimica.procedure.pose_choice import CRITERION, PoseChoice
@@ -27,17 +27,17 @@ TEMPLATE = "measurements-template.csv"
 PLACES = ("r", "R", "q")  # of the workspace, which JSON leaves out
 
 
-def write_plan(plan: PosePlan, folder: Path, program: dict[str, Any]) -> Path:
+def write_plan(plan: PosePlan, folder: Path, program: RapidOptions) -> Path:
     """See `CalibrationPlan.write`."""
-    text = rapid_program(plan, **program)  # before anything is written
+    text = rapid_program(plan, program)  # before anything is written
     check_folder("write", folder)
     folder.mkdir(exist_ok=True)
     picture = None
     if plan.cell is not None:
         picture = folder / "workspace.png"
         draw_plan(plan, picture)
-    name = f"{program.get('name', 'Calibration')}.mod"
-    page = html_page(plan, picture, name, folder=folder, trigger=program.get("trigger", OPERATOR))
+    name = f"{program.name}.mod"
+    page = html_page(plan, picture, name, folder=folder, trigger=program.trigger)
     _write(folder / "poses.csv", lambda path: _write_poses(plan, path))
     _write(folder / TEMPLATE, lambda path: _write_template(plan, path))
     _write(folder / name, lambda path: path.write_text(text, encoding="ascii"))
@@ -54,7 +54,9 @@ def check_folder(what: str, folder: Path) -> None:
     if not folder.is_dir() and (folder.exists() or not folder.absolute().parent.is_dir()):
         found = "a file" if folder.exists() else f"no folder '{folder.absolute().parent}' to make it in"
         raise ModelError(
-            f"{what}: found {found} for '{folder}', expected a folder; create it, or name another one"
+            f"found {found} for '{folder}', expected a folder; create it, or name another one",
+            place=what,
+            argument="folder",
         )
 
 
@@ -133,10 +135,8 @@ def plan_on_file(path: Path) -> dict[str, Any]:
             f"load_plan: found no plan at '{path}' ({error.strerror}), expected plan.json as "
             "CalibrationPlan.write leaves it; name its folder, or plan first"
         ) from None
-    except ValueError as error:
-        raise ModelError(
-            f"load_plan: found '{path}' that is no JSON ({error}), expected a plan; write it anew"
-        ) from None
+    except ValueError:
+        numbers = None
     if not isinstance(numbers, dict) or numbers.get("kind") != KIND:
         raise ModelError(f"load_plan: found '{path}' that is no calibration plan, expected one; plan again")
     if numbers.get("format") != FORMAT:
@@ -146,14 +146,9 @@ def plan_on_file(path: Path) -> dict[str, Any]:
         )
     try:
         return _fields(numbers)
-    except KeyError as error:
-        raise ModelError(
-            f"load_plan: found '{path}' without {error.args[0]!r}, expected a whole plan; plan again"
-        ) from None
-    except (TypeError, ValueError, AttributeError) as error:
-        raise ModelError(
-            f"load_plan: found '{path}' with something else than a plan has ({error}), expected a whole plan; plan again"
-        ) from None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        lacks = f"without {error}" if isinstance(error, KeyError) else f"with what no plan has ({error})"
+        raise ModelError(f"load_plan: found '{path}' {lacks}, expected a whole plan; plan again") from None
 
 
 def _fields(numbers: dict[str, Any]) -> dict[str, Any]:

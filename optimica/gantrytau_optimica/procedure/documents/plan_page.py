@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gantrytau.describing.pages import page, table, verdict
-from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
+from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.documents.rapid import OPERATOR
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
@@ -95,18 +95,18 @@ def _facts(plan: PosePlan) -> str:
     asked, found = plan.settings, plan.prediction
     rows = [
         ["robot", f"{plan.robot_name}, {plan.kind}"],
-        ["wanted error of the tool", um(asked["wanted"])],
-        ["tape measure", f"{um(asked['tape'])} standard deviation of joints and lengths"],
+        ["wanted error of the tool", length_text(asked["wanted"])],
+        ["tape measure", f"{length_text(asked['tape'])} standard deviation of joints and lengths"],
         ["workspace", str(plan.workspace)],
-        ["noise of the device", f"{um(found.noise)} per axis" + _angle(found.noise_angle)],
+        ["noise of the device", f"{length_text(found.noise)} per axis" + _angle(found.noise_angle)],
         [
             "expected error by noise",
-            f"{um(found.error)} in the mean, {um(float(found.position.max()))} at the worst place",
+            f"{length_text(found.error)} in the mean, {length_text(float(found.position.max()))} at the worst place",
         ],
         ["condition number", f"{found.condition:.4g}"],
         ["observability index", f"{found.observability:.4g}"],
         ["criterion", CRITERION],
-        ["worst simulated robot", f"{um(plan.verdict.error)} after calibration"],
+        ["worst simulated robot", f"{length_text(plan.verdict.error)} after calibration"],
         ["checked", f"the nominal robot, and {plan.safety}"],
         ["not reached and replaced", _lost(plan)],
     ]
@@ -125,14 +125,14 @@ def _trials(plan: PosePlan) -> str:
     trials = plan.trials
     head = ("robot", "before", "after, mean", "after, largest", "not seen", "")
     rows = [
-        (str(k + 1), um(before), um(after), um(largest), f"{unseen:.0f}", note)
+        (str(k + 1), length_text(before), length_text(after), length_text(largest), f"{unseen:.0f}", note)
         for k, (before, after, largest, unseen, note) in enumerate(
             zip(trials.before, trials.after, trials.largest, trials.unseen, trials.notes, strict=True)
         )
     ]
     return (
         "<p>Errors of the tool over the workspace, robots laid over each other best. With 25 readings of each pose averaged "
-        f"the worst robot has {um(trials.averaged)}.</p>{table(head, rows, 'numbers')}"
+        f"the worst robot has {length_text(trials.averaged)}.</p>{table(head, rows, 'numbers')}"
     )
 
 

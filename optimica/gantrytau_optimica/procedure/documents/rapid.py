@@ -9,12 +9,16 @@ characters at most, names 32.
 import re
 import textwrap
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau_optimica.calibration.assessment.calibration_acceptance import um
+from gantrytau.border.checks import check_words, number
+from gantrytau.border.refusal import Given
+from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.finding import length_text
 from gantrytau_optimica.procedure.pose_choice import CRITERION
 from gantrytau_optimica.procedure.pose_plan import PosePlan
 
@@ -30,25 +34,40 @@ RESERVED = {
 }  # fmt: skip
 
 
-def rapid_program(
-    plan: PosePlan,
-    name: str = "Calibration",
-    *,
-    speed: float = 0.1,
-    settle: float = 1.0,
-    measure: float = 2.0,
-    carts: Literal["robax", "extax"] = "robax",
-    trigger: str = OPERATOR,
-    tool: str = "tool0",
-) -> str:
-    """See `CalibrationPlan.program`."""
-    check_program(
-        name=name, speed=speed, settle=settle, measure=measure, carts=carts, trigger=trigger, tool=tool
-    )
+@dataclass(frozen=True)
+class RapidOptions(Record):
+    """Options of a robot program, as `CalibrationPlan.program` explains them; ModelError for what RAPID does not take."""
+
+    name: str = "Calibration"
+    speed: float = 0.1
+    settle: float = 1.0
+    measure: float = 2.0
+    carts: Literal["robax", "extax"] = "robax"
+    trigger: str = OPERATOR
+    tool: str = "tool0"
+
+    def __post_init__(self):
+        check_words(RapidOptions, vars(self), "program")
+        number("program", "speed", self.speed, least=1e-3)
+        number("program", "settle", self.settle, least=0.0)
+        number("program", "measure", self.measure, least=0.0)
+        for what in ("name", "tool", *(() if self.trigger in (OPERATOR, WORDS) else ("trigger",))):
+            word = getattr(self, what)
+            if not NAME.fullmatch(word) or word.lower() in RESERVED:
+                raise ModelError(
+                    "expected a name of RAPID: a letter, then letters, digits and _, 32 characters at most, no reserved "
+                    "word",
+                    place="program",
+                    found=Given(what, word),
+                )
+
+
+def rapid_program(plan: PosePlan, options: RapidOptions) -> str:
+    """The text of a RAPID module that drives through the poses of a plan."""
+    name, carts, trigger = options.name, options.carts, options.trigger
     lines = [f"MODULE {name}", *_comments(plan, carts, trigger)]
-    lines += [
-        f"  CONST speeddata speedCalibration:=[{_number(speed * 1e3, 3)},20,{_number(speed * 1e3, 3)},20];"
-    ]
+    speed = _number(options.speed * 1e3, 3)
+    lines += [f"  CONST speeddata speedCalibration:=[{speed},20,{speed},20];"]
     lines += ["  VAR num keyCalibration;"] if trigger == OPERATOR else []
     labels = [_label(plan, k) for k in range(len(plan.q))]
     for label in dict.fromkeys(labels):
@@ -56,54 +75,16 @@ def rapid_program(
     lines += ["", f"  PROC {_procedure(name)}()"]
     count, done = int(plan.measured.sum()), 0
     for label, measured in zip(labels, plan.measured, strict=True):
-        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {tool};")
+        lines.append(f"    MoveAbsJ {label}, speedCalibration, fine, {options.tool};")
         if measured:
             done += 1
-            lines += _trigger(trigger, f"{label}, {done} of {count}", settle, measure)
+            lines += _trigger(trigger, f"{label}, {done} of {count}", options.settle, options.measure)
     lines += ["  ENDPROC", "ENDMODULE", ""]
     return "\n".join(lines)
 
 
-def check_program(
-    *,
-    name: str = "Calibration",
-    speed: float = 0.1,
-    settle: float = 1.0,
-    measure: float = 2.0,
-    carts: str = "robax",
-    trigger: str = OPERATOR,
-    tool: str = "tool0",
-) -> None:
-    """ModelError for what RAPID does not take, arguments as of `CalibrationPlan.program`."""
-    if carts not in ("robax", "extax"):
-        raise ModelError(
-            f"program.carts: found {carts!r}, expected 'robax' or 'extax', the axes of a joint target that move",
-            argument="carts",
-        )
-    names = [
-        ("name", name),
-        ("tool", tool),
-        *([] if trigger in (OPERATOR, WORDS) else [("trigger", trigger)]),
-    ]
-    for what, word in names:
-        _check_name(what, word)
-    for what, value, least in (("speed", speed, 1e-3), ("settle", settle, 0.0), ("measure", measure, 0.0)):
-        if not (np.isfinite(value) and value >= least):
-            unit = "m/s above 0" if what == "speed" else "s, not negative"
-            raise ModelError(f"program.{what}: found {value!r}, expected a number in {unit}", argument=what)
-
-
 def _procedure(name: str) -> str:
     return f"Run{name}"[:32]
-
-
-def _check_name(what: str, word: str) -> None:
-    if not NAME.fullmatch(word) or word.lower() in RESERVED:
-        raise ModelError(
-            f"program.{what}: found {word!r}, expected a name of RAPID: a letter, then letters, digits and _, 32 "
-            "characters at most, no reserved word",
-            argument=what,
-        )
 
 
 def _label(plan: PosePlan, row: int) -> str:
@@ -155,8 +136,8 @@ def _comments(plan: PosePlan, carts: str, trigger: str) -> list[str]:
         "before the start, and after each stop begin there again.",
         _waiting(trigger),
         f"Expected error of the tool by noise after calibration with all {len(plan.prediction.rows)} poses of the plan "
-        f"{um(plan.prediction.error)}; of the worst simulated robot {um(plan.verdict.error)}, wanted "
-        f"{um(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
+        f"{length_text(plan.prediction.error)}; of the worst simulated robot {length_text(plan.verdict.error)}, wanted "
+        f"{length_text(plan.verdict.wanted)}: {'good' if plan.verdict.good else 'NOT GOOD ENOUGH'}.",
         f"Poses: {CRITERION}.",
         f"Nominal parameters in m ({plan.kind}):",
         *_parameters(plan),

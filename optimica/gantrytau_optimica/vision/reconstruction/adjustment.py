@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gantrytau.kinematics.rotations import mean_rotation
+from gantrytau_optimica.fitting.blocks import BlockRows, minimised, reduced
+from gantrytau_optimica.fitting.robust import huber_weights
 from gantrytau_optimica.vision.opencv import VisionError
 from gantrytau_optimica.vision.reconstruction.bundle import LENS, Bundle, State
 from gantrytau_optimica.vision.reconstruction.free_network import free_covariance
@@ -16,7 +18,6 @@ from gantrytau_optimica.vision.reconstruction.relative_orientation import (
     plates_of_one,
     triangulated,
 )
-from gantrytau_optimica.vision.reconstruction.schur import BlockRows, minimised, reduced
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
 Array = np.ndarray
@@ -76,7 +77,7 @@ def adjusted(bundle: Bundle, state: State) -> tuple[Bundle, State, BlockRows, in
             max(float(np.sqrt(np.sum((share * missed) ** 2) / max(freedom, 1))), LEAST_SIGMA),
         )
         beyond = max(HUBER * float(np.median(missed[bundle.seen > 0])), LEAST_SIGMA)
-        old, share = share, np.sqrt(np.minimum(1.0, beyond / np.maximum(missed, beyond)))
+        old, share = share, np.sqrt(huber_weights(missed, beyond))
         if np.allclose(share, old, atol=0.01) and abs(sigma / before - 1) < 0.1:
             break
     bundle = replace(bundle, weights=bundle.seen * share / sigma)

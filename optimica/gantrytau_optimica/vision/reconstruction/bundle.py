@@ -12,8 +12,8 @@ import numpy as np
 
 from gantrytau.kinematics.rotations import skewed, turned
 from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.vision.intrinsics import Camera
-from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing
 
 Array = np.ndarray

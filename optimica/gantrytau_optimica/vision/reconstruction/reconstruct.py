@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau.border.checks import check_words
+from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.vision.detection.detections import Detections
 from gantrytau_optimica.vision.intrinsics import Camera
@@ -30,7 +31,6 @@ from gantrytau_optimica.vision.reconstruction.reconstruction_checks import (
     told_scale,
     usable_poses,
 )
-from gantrytau_optimica.vision.reconstruction.schur import BlockRows
 from gantrytau_optimica.vision.reconstruction.spacing import spacing_of
 from gantrytau_optimica.vision.reconstruction.stray_images import (
     in_words,

@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.kinematics.rotations import mean_rotation
 from gantrytau_optimica.fitting.finding import Finding
-from gantrytau_optimica.fitting.robust import NORMAL, OUTLIER
+from gantrytau_optimica.fitting.robust import OUTLIER, robust_deviation
 from gantrytau_optimica.vision.reconstruction.adjustment import LEAST_SIGMA
 from gantrytau_optimica.vision.reconstruction.bundle import Bundle, State
 from gantrytau_optimica.vision.reconstruction.relative_orientation import extents, plates
@@ -110,7 +110,7 @@ def stray_images(bundle: Bundle, state: State) -> list[tuple[int, tuple[int, ...
     """Poses with an image that does not belong to them, and which cameras took it, as far as that can be told."""
     found = left_by_poses(bundle, state)
     usual = max(1.0, float(np.median(found.shifts)) / CHI_2)
-    spread = NORMAL * float(np.median(np.abs(found.shapes - 1.0)))
+    spread = robust_deviation(found.shapes - 1.0)
     wrong = (found.shifts > OUTLIER * usual) | (found.shapes > max(SHAPE, 1.0 + OUTLIER * spread))
     poses = np.flatnonzero(wrong).tolist()
     if len(poses) > MOST * len(wrong):

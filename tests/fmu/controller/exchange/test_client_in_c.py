@@ -34,9 +34,9 @@ def test_it_may_be_there_before_the_controller(program):
         time.sleep(0.2)
         controller = Controller(slide(), corrected, clients=[RemoteClient("stream", Declaration([DELTA]))])
         with controller.serve(port) as server:
-            server.wait(timeout=10.0)
+            server.wait(timeout=60.0)
             found = controller.run(STOP)
-        assert running.communicate(timeout=10.0)[0] == f"{found.time.size} answers; the run has ended\n"
+        assert running.communicate(timeout=60.0)[0] == f"{found.time.size} answers; the run has ended\n"
 
 
 def test_a_client_in_sixty_lines_of_c_does_what_one_in_python_does(program):
@@ -49,9 +49,9 @@ def test_a_client_in_sixty_lines_of_c_does_what_one_in_python_does(program):
     )
     with controller.serve() as server:
         running = subprocess.Popen([program, str(server.port)], stdout=subprocess.PIPE, text=True)
-        server.wait(timeout=10.0)
+        server.wait(timeout=60.0)
         found = controller.run(STOP)
-        said, _ = running.communicate(timeout=10.0)
+        said, _ = running.communicate(timeout=60.0)
     assert said == f"{found.time.size} answers; the run has ended\n"
     assert np.array_equal(found["stream.delta"], expected["stream.delta"])
     assert np.array_equal(found["q"], expected["q"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gantrytau import Samples, simulate, translate
-from gantrytau_fmu import cosimulate, export_fmu
+from gantrytau_fmu import Master, cosimulate, export_fmu
 from gantrytau_models.leadthrough import ContactLoop, LeadThrough, LedTool, SurfaceTracking, surfaces
 
 PERIOD = 0.004
@@ -50,7 +50,7 @@ def test_gauss_seidel_moves_as_the_whole_model(fmus):
         stop=3.0,
         step=PERIOD,
         inputs={f"tool.{name}": signal for name, signal in one.items()},
-        tolerance=1e-12,
+        master=Master(tolerance=1e-12),
     )
     assert whole["f_n"].max() > 2
     rows = np.searchsorted(whole.time, parts.time - 1e-9)
@@ -65,7 +65,7 @@ def test_jacobi_is_a_sample_late_and_bears_a_third_of_the_gain(fmus, share, hops
     assert np.isclose(late.critical_gain / ContactLoop(1.0).critical_gain, 0.313, atol=0.001)
     start = {"tool.face.stiffness": share * late.critical_gain / 0.03, "tool.face.tilt": 0.0}
     start |= {f"tool.hand.{name}": value for name, value in QUIET.items()}
-    run = cosimulate(fmus, WIRES, stop=12.0, step=PERIOD, order="jacobi", start=start)
+    run = cosimulate(fmus, WIRES, stop=12.0, step=PERIOD, start=start, master=Master(order="jacobi"))
     force = run["tool.f_n"][run.time > 6.0]
     if not hops:
         assert np.ptp(force) < 0.05

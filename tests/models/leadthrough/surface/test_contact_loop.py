@@ -94,22 +94,13 @@ def test_the_curve_passes_as_near_to_the_critical_point_as_the_margin_says():
     assert abs(crossing + 0.95) < 0.02
 
 
+# a mode so slow that its critical gain drowns in rounding, and numbers that are none
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        dict(gain=-1.0),
-        dict(gain=np.nan),
-        dict(gain="600"),
-        dict(gain=np.array([1.0, 2.0])),
-        dict(gain=1.0, T_v=-1.0),
-        dict(gain=1.0, period=0),
-        *(dict(gain=1.0, mode=mode) for mode in (0.0, -70.0, np.nan, np.inf)),
-        dict(gain=1.0, mode=1e-9),  # its critical gain drowns in rounding
-    ],
+    "wrong", [dict(gain=-1.0), dict(mode=0.0), dict(T_v=-1.0), dict(period=0), dict(mode=1e-9)]
 )
 def test_wrong_loops_are_refused(wrong):
-    with pytest.raises(ModelError, match="ContactLoop: found"):
-        ContactLoop(**wrong).critical_gain  # noqa: B018
+    with pytest.raises(ModelError, match=f"ContactLoop: found {next(iter(wrong))}="):
+        ContactLoop(**(dict(gain=1.0) | wrong)).critical_gain  # noqa: B018
 
 
 @pytest.mark.parametrize("mode", [1e-3, 1.0])

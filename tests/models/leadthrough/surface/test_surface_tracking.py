@@ -172,10 +172,7 @@ def test_the_critical_gain_divides_quiet_from_hopping(share, least, most):
         (dict(face=dict(tilt=-np.pi / 2)), r"face\.tilt: .* expected at least -0\.523"),
         (dict(face=dict(ripple=0.2)), r"expected flat ripples, 30 degrees at most; are they in m\?"),
         (dict(face=dict(ripple_length=0.0)), "expected ripples longer than nothing"),
-        (
-            dict(control=dict(normal=dict(gate=10.0))),
-            r"control\.normal\.gate: value is 10, expected at most 3\.14",
-        ),
+        (dict(control=dict(normal=dict(gate=10.0))), r"control\.normal\.gate: value is 10"),
     ],
 )
 def test_angles_in_degrees_and_lengths_in_millimetres_are_refused(wrong, words):
@@ -195,11 +192,7 @@ def test_the_eye_is_as_late_whatever_the_period(period):
 
 
 def test_wrong_records_are_refused():
-    with pytest.raises(
-        ModelError, match=r"SurfaceTracking: found str, expected a record such as surfaces.METAL"
-    ):
+    with pytest.raises(ModelError, match="SurfaceTracking: found surface='metal', expected a record such as"):
         SurfaceTracking(cast(Any, "metal"))
-    with pytest.raises(
-        ModelError, match=r"Operator: found SurfaceRecord, expected a record such as operators.SKILLED"
-    ):
+    with pytest.raises(ModelError, match=r"Operator: found record=.*, expected a record such as operators"):
         SurfaceTracking(surfaces.METAL, operator=cast(Any, surfaces.METAL))

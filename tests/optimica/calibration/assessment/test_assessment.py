@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import (
@@ -78,13 +77,6 @@ def test_too_few_poses_are_foretold_by_none():
     assert not judge(checked, wanted=1.0).good
     with pytest.raises(CalibrationError, match="found 6 usable poses"):
         cross_validate(ROBOT, measured(6))
-
-
-@pytest.mark.parametrize("parts", [1, 2.5, "five"])
-def test_what_are_no_parts(parts):
-    with pytest.raises(ModelError, match="cross_validate: found parts=") as caught:
-        cross_validate(ROBOT, measured(20), parts=parts)
-    assert caught.value.argument == "parts"
 
 
 def test_what_data_hold_needs_no_word():

@@ -14,6 +14,7 @@ from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from tests.optimica.calibration.f1_data import ANGLE, DEVICE, f1_arms, f1_poses, measured
 from tests.optimica.calibration.linear_data import carts
+from tests.optimica.refusals import refused
 
 # Table 5.4, Dressler (2012); 1u2 is turntables[0].orientation, 1u3 and 2u3 those of [1] and [2], r3 turntables[2].offset
 TABLE_5_4 = {
@@ -166,12 +167,10 @@ def test_rows_that_were_not_seen_count_for_nothing(robot, poses):
         np.testing.assert_array_equal(a.singular_values, b.singular_values)
     with pytest.raises(ModelError, match="measurements: found no finite numbers in any of 185 rows"):
         identifiability(robot, (q, np.nan * r, R))
-    with pytest.raises(ModelError, match=r"measurements: found arrays of the shapes \(185, 6\), \(3,\)"):
+    with refused("r"):
         identifiability(robot, (q, r[0], R))
-    with pytest.raises(ModelError, match="measurements: found q, r or R that hold no numbers"):
+    with refused("r"):
         identifiability(robot, (q, "r", R))
-    with pytest.raises(ModelError, match=r"tape: found 0\.0, expected a standard deviation above 0"):
-        identifiability(robot, poses, tape=0.0)
 
 
 def test_few_poses_leave_what_they_cannot_count():

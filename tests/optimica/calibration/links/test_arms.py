@@ -1,7 +1,6 @@
 """Closure equations of arms with turntables, and their fits, against the reference by hand, differences and Ipopt."""
 
 import dataclasses
-import re
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from gantrytau import Array, Model, ModelError, Parameter, SolveError
 from gantrytau.kinematics.rotations import of_vectors, rotation_vector
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
-from gantrytau_optimica.calibration.fitting.ipopt_fit import solve, solve_constrained
+from gantrytau_optimica.calibration.fitting.ipopt_fit import solve
 from gantrytau_optimica.calibration.fitting.rod_fit import fit_group
 from gantrytau_optimica.calibration.links.arm_closure import read_arms, rotation
 from gantrytau_optimica.calibration.links.arm_factors import scales
@@ -160,7 +159,7 @@ def fitted(arm, data):
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_ipopt_finds_the_same_arm(orientation, data):
     found = fitted(disturbed(f1_arms(orientation)[1], seed=7), data)
-    other = solve(found)
+    (other,) = solve([found])
     assert np.abs(found.group.errors(found.x) - found.group.errors(other.x)).max() < 1e-10  # m
     assert other.x == pytest.approx(found.x, abs=1e-7)
 
@@ -169,7 +168,7 @@ def test_ipopt_keeps_what_is_fixed_or_limited(truth, data):
     arm = truth[0]
     name = "arms[0].links[0].length"
     low, high = float(arm.values[name]) + 1e-4, float(arm.values[name]) + 2e-4
-    (fit,) = solve_constrained([fitted(arm, data)], {"arms[0].direction[2]": 0.99, name: (low, high)})
+    (fit,) = solve([fitted(arm, data)], {"arms[0].direction[2]": 0.99, name: (low, high)})
     assert fit.values["arms[0].direction[2]"] == pytest.approx(0.99, abs=1e-12)
     assert low - 1e-9 < fit.values[name] < high + 1e-9
 
@@ -210,13 +209,7 @@ def test_poses_out_of_reach_are_told(truth, poses):
 
 
 def test_what_cannot_be_an_arm_is_refused():
-    with pytest.raises(
-        ModelError, match=r"orientation: found 'euler', expected one of 'local', 'unit', 'free'"
-    ):
-        read_arms(F1GantryTau(prototypes.F1), "euler")  # type: ignore
-    with pytest.raises(
-        ModelError, match=r"found FourBar that does not say what its rods are, expected a robot such as"
-    ):
+    with pytest.raises(ModelError, match="FourBar that does not say what its rods are"):
         read_arms(FourBar())
     stretched = F1GantryTau(prototypes.F1, turntables=[dict(orientation=[1.0, 0.1, 0.0, 0.0]), {}, {}])
     with pytest.raises(
@@ -227,35 +220,23 @@ def test_what_cannot_be_an_arm_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "argument", "names"),
     [
-        (dict(loss="absolute"), "loss: found 'absolute', expected 'linear' or 'robust'"),
-        (
-            dict(prior={"arms[0].lenght": 1e-3}),
-            "prior for 'arms[0].lenght', which is not identified; did you mean 'arms[0].links[0].length",
-        ),
-        (dict(prior={"arms[0].offset": 0.0}), "found the deviation 0 for 'arms[0].offset' in prior"),
+        (dict(prior={"arms[2].lenght": 1e-3}), "prior", "did you mean 'arms[2]."),
+        (dict(prior={"arms[2].offset": 0.0}), "prior", "arms[2].offset"),
+        (dict(prior=[1.0]), "prior", "a dict"),
+        (dict(q=np.zeros((185, 4))), "q", "185 x 4"),
+        (dict(r=np.zeros((4, 3))), "r", "4 x 3"),
+        (dict(r=np.full((185, 3), np.nan)), "r", "finite"),
+        (dict(R=None), "R", "the plate turns"),
     ],
-    ids=["loss", "name", "deviation"],
+    ids=["name", "deviation", "mapping", "joints", "rows", "finite", "orientations"],
 )
-def test_wrong_words_of_a_fit_are_told(change, message, truth, data):
-    with pytest.raises(ModelError, match=re.escape(message)):
-        fit_arm(truth[0], *data, **change)
-
-
-def test_arrays_that_do_not_fit_are_told(truth, data):
-    with pytest.raises(
-        ModelError, match=r"arms\[2\]: found q, r, R of the shapes .*, expected \(N, 6\), \(N, 3\)"
-    ):
-        fit_arm(truth[2], data.q[:, :5], data.r, data.R)
-    with pytest.raises(ModelError, match=r"arms\[0\]: found no orientations R, expected \(N, 3, 3\)"):
-        fit_arm(truth[0], data.q, data.r, None)
-    r = data.r.copy()
-    r[[4, 7]] = np.nan
-    with pytest.raises(ModelError, match=r"numbers that are not finite in rows 4, 7; leave those poses out"):
-        fit_arm(truth[0], data.q, r, data.R)
-    with pytest.raises(ModelError, match="'x' is not identified"):
-        solve_constrained([fitted(truth[0], data)], {"x": 1.0})
+def test_what_does_not_fit_an_arm_is_refused(change, argument, names, truth, data):
+    with pytest.raises(ModelError) as refusal:
+        fit_arm(truth[2], **{**data._asdict(), **change})
+    assert refusal.value.argument == argument
+    assert names in str(refusal.value)
 
 
 class Guideway(Model):

@@ -1,10 +1,9 @@
-"""Closure equations: their slopes, and a few rows that stand for all poses."""
+"""Closure equations: their Jacobians, and a few rows that stand for all poses."""
 
 import numpy as np
 import pytest
 
 from gantrytau.kinematics.rotations import of_vector, of_vectors
-from gantrytau_optimica.calibration.fitting.gauss_newton import gauss_newton
 from gantrytau_optimica.calibration.links.closure import Chain, condense
 from gantrytau_optimica.calibration.links.guideway_points import between, slope, straight
 from gantrytau_optimica.calibration.links.linear_start import linear_start
@@ -26,13 +25,13 @@ KINDS = ["line", "line plate", "points", "points plate"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_slopes_are_the_derivatives(kind):
+def test_jacobians_are_the_derivatives(kind):
     one = chain(kind)
     p = RNG.normal(size=one.size)
     step = 1e-6
     difference = [(one.error(p + step * e) - one.error(p - step * e)) / (2 * step) for e in np.eye(one.size)]
     # central differences of a polynomial of the fourth degree: step^2 and rounding / step
-    assert one.slopes(p) == pytest.approx(np.transpose(difference), abs=1e-7)
+    assert one.jacobian(p) == pytest.approx(np.transpose(difference), abs=1e-7)
 
 
 @pytest.mark.parametrize("kind", ["line", "line plate"])
@@ -43,8 +42,8 @@ def test_few_rows_have_the_squares_of_all_poses(kind, weighted):
     few = condense(one, weights)
     p = RNG.normal(size=one.size)
     w = 1.0 if weights is None else weights
-    e, J = w * one.error(p), one.slopes(p) * (1.0 if weights is None else weights[:, None])
-    f, K = few.error(p), few.slopes(p)
+    e, J = w * one.error(p), one.jacobian(p) * (1.0 if weights is None else weights[:, None])
+    f, K = few.error(p), few.jacobian(p)
     assert len(f) <= 31
     assert f @ f == pytest.approx(e @ e, rel=1e-12)
     assert K.T @ K == pytest.approx(J.T @ J, rel=1e-10, abs=1e-8 * np.abs(J.T @ J).max())
@@ -61,37 +60,6 @@ def test_the_linear_start_is_exact_without_noise(kind):
     r = true[1:4] + one.q[:, None] * true[4:7] + u
     r -= 0.0 if one.R is None else one.R @ true[7:10]
     assert linear_start(Chain(kind, 0, one.q, r, one.R)) == pytest.approx(true, abs=1e-9)
-
-
-def test_directions_that_data_do_not_hold_are_left_alone():
-    def errors(x):
-        return np.array([x[0] + x[1] - 3.0, 2 * (x[0] + x[1]) - 6.0, 1e-6 * (x[0] - x[1])])
-
-    def slopes(x):
-        return np.array([[1.0, 1.0], [2.0, 2.0], [1e-6, -1e-6]])
-
-    free = np.array([True, True])
-    truncated = gauss_newton(errors, slopes, np.array([1.0, 0.0]), free, smallest=1e-3)
-    assert truncated.x == pytest.approx([2.0, 1.0])  # the shortest way to x0 + x1 = 3
-    assert truncated.rank == 1
-    whole = gauss_newton(errors, slopes, np.array([1.0, 0.0]), free)
-    assert whole.x == pytest.approx([1.5, 1.5])
-    held = gauss_newton(errors, slopes, np.array([1.0, 0.0]), np.array([False, True]))
-    assert held.x == pytest.approx([1.0, 2.0], abs=1e-9)
-
-
-def test_steps_are_shortened_where_the_whole_overshoots():
-    # arctan: Newton from 3 diverges, as its first step leads to -9.5
-    found = gauss_newton(
-        lambda x: np.arctan(x), lambda x: np.diag(1 / (1 + x * x)), np.array([3.0]), np.array([True])
-    )
-    assert found.success
-    assert found.x[0] == pytest.approx(0.0, abs=1e-10)
-
-
-def test_errors_that_are_not_finite_end_without_success():
-    found = gauss_newton(lambda x: x * np.nan, lambda x: np.eye(1), np.array([1.0]), np.array([True]))
-    assert not found.success
 
 
 def test_between_measured_points_the_way_is_straight():

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import re
 from functools import cache
 
 import numpy as np
@@ -124,7 +125,7 @@ def test_what_data_do_not_tell_is_named():
         Scara(), measured("scara"), parameters=["upper.r[0]", "column.r", "tool.m"], joints=SCARA
     )
     (told,) = (f for f in found.findings if f.kind == "undetermined")
-    assert "column.r[0] follows from frame.t[0]" in str(told)
+    assert "frame.t[0] and column.r[0] cannot be told apart by these data" in str(told)
     assert "nothing that was measured depends on tool.m" in str(told)
     assert "or measure in the base of the robot, frame='base'" in str(told)
     assert found.deviations["tool.m"] == np.inf
@@ -210,23 +211,19 @@ def test_poses_are_selected_for_named_parameters(method):
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "names"),
     [
-        (dict(parameters=["uper.r"]), r"has no parameter 'uper.r'; did you mean 'upper.r'\?"),
-        (dict(parameters="upper.r"), r"parameters='upper.r', expected a list of names"),
-        (dict(method="ipopt"), "found method='ipopt' with parameters=, expected 'gauss-newton'"),
-        (dict(joints=SCARA[:2]), "measurements of 3 joints for Scara, expected 2: shoulder.phi, elbow.phi"),
-        (dict(prior={"upperr": 1e-3}), r"prior for 'upperr', which is not identified; did you mean"),
-        (dict(prior={"upper.r[0]": 0.0}), "found the deviation 0 for 'upper.r.0.' in prior"),
-        (dict(robot=3), "found 3 as robot, expected a model instance with a tool"),
+        (dict(parameters=["uper.r"]), "upper.r"),
+        (dict(parameters="upper.r"), "parameters"),
+        (dict(method="ipopt"), "method"),
+        (dict(joints=SCARA[:2]), "shoulder.phi, elbow.phi"),
+        (dict(prior={"upperr": 1e-3}), "upperr"),
+        (dict(prior={"upper.r[0]": 0.0}), "upper.r[0]"),
+        (dict(robot=3), "robot"),
+        (dict(robot=Pendulum(), parameters=["length"], joints=["phi"]), "tool.r"),
     ],
 )
-def test_what_does_not_fit_is_refused(change, words):
+def test_what_does_not_fit_is_refused(change, names):
     policy = dict(robot=Scara(), parameters=["upper.r[0]"], joints=SCARA) | change
-    with pytest.raises(ModelError, match=words):
+    with pytest.raises(ModelError, match=re.escape(names)):
         calibrate(policy.pop("robot"), measured("scara"), **policy)
-
-
-def test_a_model_without_a_tool_is_refused():
-    with pytest.raises(ModelError, match=r"Pendulum has no 'tool.r', expected the position of a tool"):
-        calibrate(Pendulum(), measured("scara"), parameters=["length"], joints=["phi"])

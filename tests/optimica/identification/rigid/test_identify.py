@@ -9,7 +9,6 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import IdentificationError, MotionLog, identify
-from gantrytau_optimica.identification.least_squares.base_parameters import base_parameters
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
     RobotDynamics,
     candidates,
@@ -69,16 +68,6 @@ def test_link_masses_are_weak_and_limits_cost_next_to_nothing():
     assert negative >= 18
     assert np.sum(np.array(costs) <= 1.001) >= 17
     assert max(costs) <= 1.002
-
-
-def test_parameters_that_only_appear_together_are_named():
-    """A column that is the sum of two others, whatever its units, and one without influence."""
-    A = np.random.default_rng(0).standard_normal((40, 2))
-    base = base_parameters(np.column_stack([A, A @ [1.0, -0.5], np.zeros(40)]) * [1e9, 1.0, 1.0, 1.0])
-    names = ["one", "two", "both", "none"]
-    assert base.silent(names) == ("none",)
-    assert len(base.independent) == 2
-    assert len(base.words(names)) == 2  # any two of the three stand for the third
 
 
 def test_many_rows_have_the_numbers_of_few():

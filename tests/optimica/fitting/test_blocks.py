@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from gantrytau_optimica.vision.reconstruction.schur import BlockRows, minimised, reduced
+from gantrytau_optimica.fitting.blocks import BlockRows, minimised, reduced
 
 BLOCKS, OWN, SHARED, ROWS = 6, 2, 3, 5
 
