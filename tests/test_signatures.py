@@ -53,16 +53,6 @@ def wrong_values(hint: Any) -> tuple[Any, ...]:
     return ()
 
 
-def stand_in(hint: Any) -> Any:
-    """What a required argument is given while another is wrong: a number or word where it is one, else any object."""
-    for kind in members(hint):
-        if kind in (int, float):
-            return kind(1)
-        if get_origin(kind) is Literal:
-            return get_args(kind)[0]
-    return object()
-
-
 def checks_itself(kind: type) -> bool:
     """Whether people make objects of a class with arguments of their own: no model, no record that is only returned."""
     made = "__post_init__" if is_dataclass(kind) else "__init__"

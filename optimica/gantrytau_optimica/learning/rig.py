@@ -91,14 +91,7 @@ class Rig:
         stops.
         """
         whole("Rig.run", "seed", seed, least=0)
-        q_ref = array("Rig.run", "position", position, (None, len(self.joints)))
-        if len(q_ref) < 2:
-            raise ModelError(
-                "found one row of position, expected two at least", place="Rig.run", argument="position"
-            )
-        v_ref = (
-            np.zeros_like(q_ref) if velocity is None else array("Rig.run", "velocity", velocity, q_ref.shape)
-        )
+        q_ref, v_ref = self._references(position, velocity)
         random = np.random.default_rng(seed)
         t = self.period * np.arange(len(q_ref))
         loop, forces = self._at_rest(q_ref[0])
@@ -106,15 +99,11 @@ class Rig:
         # all are samples, so that the equations of one run serve for the next
         series = {"q_ref": q_ref, "v_ref": v_ref, **drawn}
         if "push.f" in self.loop.vectors:
-            series["push.f"] = (
-                np.zeros((1, 3)) if push is None else array("Rig.run", "push", push, (len(t), 3))
-            )
+            force = np.zeros((len(t), 3)) if push is None else push
+            series["push.f"] = array("Rig.run", "push", force, (len(t), 3))
         elif push is not None:
-            raise ModelError(
-                f"found a push and {self.robot.name}, expected a robot with a tool that has a frame",
-                place="Rig.run",
-                argument="push",
-            )
+            words = f"found a push and {self.robot.name}, expected a robot with a tool that has a frame"
+            raise ModelError(words, place="Rig.run", argument="push")
         inputs = {name: Samples(t[: len(u)], u, kind="constant") for name, u in series.items()}
         found = simulate(
             loop,
@@ -173,6 +162,16 @@ class Rig:
             if law is not None:
                 still |= {f"robot.{law}.level": 1.0, f"robot.{law}.z_0": 0.0}
         return loop, still | {f"controllers[{k}].f_ff": float(force) for k, force in enumerate(forces)}
+
+    def _references(self, position: ArrayLike, velocity: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
+        q_ref = array("Rig.run", "position", position, (None, len(self.joints)))
+        if len(q_ref) < 2:
+            raise ModelError(
+                "found one row of position, expected two at least", place="Rig.run", argument="position"
+            )
+        velocity = np.zeros_like(q_ref) if velocity is None else velocity
+        v_ref = array("Rig.run", "velocity", velocity, q_ref.shape)
+        return q_ref, v_ref
 
     def __repr__(self) -> str:
         n = len(self.joints)

@@ -91,21 +91,13 @@ def rehearse_plan(
     check_words(rehearse_plan, locals())
     number("rehearse_plan", "side", side, above=0.0)
     whole("rehearse_plan", "seed", seed, least=0)
-    device = planned.cell.device
-    if not isinstance(device, Cameras):
-        raise ModelError(
-            f'found a plan for {type(device).__name__}, expected cameras; set kind = "stereo cameras" in [device] and '
-            "plan anew",
-            place="rehearse_plan",
-            argument="planned",
-        )
+    device = _cameras_of(planned)
     tell = progress or (lambda words: None)
     plan = planned.plan
     rows = np.flatnonzero(plan.measured)
     q = plan.q[rows]
-    truth = build_fleet(
-        planned.cell.robot, planned.cell.limits, tape=planned.cell.tape, robots=1, seed=seed
-    ).others[0]
+    cell = planned.cell
+    truth = build_fleet(cell.robot, cell.limits, tape=cell.tape, robots=1, seed=seed).others[0]
     r, R = truth.pose(q)
     scene = Scene(Pattern.quincunx(side), place=device.target, R=_axes(device.facing), seed=seed)
     folder = planned.folder / "rehearsal"
@@ -134,6 +126,16 @@ def rehearse_plan(
         _tool(calibration, truth, plan.q),
         (folder, folder / "measurements.csv"),
     )
+
+
+def _cameras_of(planned: PlannedCell) -> Cameras:
+    """The device of a plan; ModelError for another than cameras."""
+    device = planned.cell.device
+    if not isinstance(device, Cameras):
+        words = 'expected cameras; set kind = "stereo cameras" in [device] and plan anew'
+        found_kind = f"found a plan for {type(device).__name__}, "
+        raise ModelError(found_kind + words, place="rehearse_plan", argument="planned")
+    return device
 
 
 def _calibrated(planned: PlannedCell, measurements: Measurements) -> tuple[Calibration, CalibrationVerdict]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Model, ModelError, SolveError, translate
+from gantrytau import Dae, Model, ModelError, SolveError, translate
 from gantrytau.border.checks import check_words, number, whole
 from gantrytau_optimica.identification.excitation.excitation_limits import ExcitationLimits, excitation_limits
 from gantrytau_optimica.identification.excitation.excitation_program import Criterion, ExcitationProgram
@@ -48,11 +48,7 @@ def design_excitation(
     Raises ModelError for what does not fit, SolveError where no motion keeps the limits. Swevers et al. (1997).
     """
     check_words(design_excitation, locals())
-    for name, value in dict(duration=duration, period=period).items():
-        if value is not None:
-            number("design_excitation", name, value, above=PERIOD)
-    for name, value, least in (("harmonics", harmonics, 2), ("starts", starts, 1), ("seed", seed, 0)):
-        whole("design_excitation", name, value, least=least)
+    _check_numbers(duration, period, harmonics=harmonics, starts=starts, seed=seed)
     dae = translate(robot)
     if TOOL[0] not in dae.variables:
         raise ModelError(
@@ -75,7 +71,7 @@ def design_excitation(
     Y = Y.reshape(-1, len(soft.names))
     log = MotionLog(rows, q, f, v=v, r=motion[:, :3])
     predicted = dict(zip(soft.names, deviations(Y).tolist(), strict=True))
-    start: dict[str, float] = dict(zip(TOOL, motion[0, :3].tolist(), strict=True))
+    start = dict(zip(TOOL, motion[0, :3].tolist(), strict=True))
     by_actuators = motion_regressor(dae, sharp.coordinates, soft.names, SHARP)
     return Excitation(
         dae.name,
@@ -89,6 +85,16 @@ def design_excitation(
         start,
         by_actuators,
     )
+
+
+def _with_a_tool(dae: Dae) -> Dae:
+    if TOOL[0] not in dae.variables:
+        raise ModelError(
+            f"{dae.name} has no tool.r, expected a robot with the position of its tool",
+            place="design_excitation",
+            argument="robot",
+        )
+    return dae
 
 
 def whole_periods(duration: float, harmonics: int, limits: ExcitationLimits) -> float:
@@ -108,6 +114,15 @@ def _best(
             "forces hold the robot at rest in the whole box, and whether it is within reach"
         )
     return min(kept, key=lambda each: each[0])[1:]
+
+
+def _check_numbers(duration: float, period: float | None, **counts: int) -> None:
+    number("design_excitation", "duration", duration, above=PERIOD)
+    if period is not None:
+        number("design_excitation", "period", period, above=PERIOD)
+    least = dict(harmonics=2, starts=1, seed=0)
+    for name, value in counts.items():
+        whole("design_excitation", name, value, least=least[name])
 
 
 def _begins(limits: ExcitationLimits, harmonics: int, seed: int, starts: int) -> list[np.ndarray]:

@@ -72,12 +72,9 @@ def identify(
     that the model declares, no body without a density (pseudo-inertia). cutoff: Hz, of the zero-phase filter of both
     sides; minimum_speed: m/s or rad/s, below which a joint's rows do not count; twice Stribeck's keeps that out of the
     other laws. holdout: the part that judges a fit of the rest. Gautier (1991); Dressler (2012), section 6.1.
-
     Raises ModelError for unknown names, IdentificationError for data that determine nothing.
     """
-    check_words(identify, locals())
-    number("identify", "cutoff", cutoff, above=0.0)
-    number("identify", "minimum_speed", minimum_speed, least=0.0)
+    _check_policy(friction, holdout, cutoff, minimum_speed)
     dae = robot if isinstance(robot, Dae) else translate(robot)
     logs = [log] if isinstance(log, MotionLog) else list(log)
     coordinates, forces = drives(dae)
@@ -86,13 +83,13 @@ def identify(
     findings += beside_robot(dae, coordinates, logs, findings)
     given = fixed_values(dae, fixed or {}, len(coordinates), friction)
     known = {n: v for n, v in given.items() if is_friction(n)}
-    held = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
-    rigid = held | (dict.fromkeys(frictions(dae), 0.0) if friction else {})
+    fixed_in_model = {model_name(dae, n): float(v) for n, v in given.items() if n not in known}
+    rigid = fixed_in_model | (dict.fromkeys(frictions(dae), 0.0) if friction else {})
+    names = asked_parameters(dae, parameters, given, friction)
+    columns = FrictionColumns(len(coordinates), friction, known) if friction else None
+    motions = [replace(filtered_motion(part, cutoff), origin=origin) for origin, part in parts]
     problem = RigidRegression(
-        RobotDynamics(dae, coordinates, forces, asked_parameters(dae, parameters, given, friction), rigid),
-        FrictionColumns(len(coordinates), friction, known) if friction else None,
-        [replace(filtered_motion(part, cutoff), origin=origin) for origin, part in parts],
-        minimum_speed,
+        RobotDynamics(dae, coordinates, forces, names, rigid), columns, motions, minimum_speed
     )
     problem = problem if parameters else problem.without_silent()
     nonlinear = problem.nonlinear()
@@ -109,7 +106,13 @@ def identify(
     doubts += second_looks(problem, found, rows, given)
     answer = replace(answer, fixed=given, nonlinear=nonlinear, held_out=judged, diagnostics=left)
     answer = replace(answer, findings=_noticed(findings, doubts, left.findings))
-    return replace(answer, model_values=held | dict(answer.model_values))
+    return replace(answer, model_values=fixed_in_model | dict(answer.model_values))
+
+
+def _check_policy(friction: Any, holdout: Any, cutoff: float, minimum_speed: float) -> None:
+    check_words(identify, dict(friction=friction, holdout=holdout))
+    number("identify", "cutoff", cutoff, above=0.0)
+    number("identify", "minimum_speed", minimum_speed, least=0.0)
 
 
 def _noticed(
