@@ -26,25 +26,27 @@ import numpy as np
 
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_optimica import (
-    Actuators,
     Complementary,
     Gradient,
     Kalman,
     Learning,
-    LearningError,
     Measured,
     NormOptimal,
     Rig,
-    Scatter,
     Tukey,
     ZeroPhase,
-    arm_model,
     design_q,
-    estimated_response,
     learn,
+    square_reference,
+)
+from gantrytau_optimica.learning import (
+    Actuators,
+    LearningError,
+    Scatter,
+    arm_model,
+    estimated_response,
     plot_learning,
     plot_q,
-    square_reference,
 )
 
 RECORD = prototypes.L1_flexible

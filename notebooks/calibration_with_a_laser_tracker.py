@@ -35,13 +35,11 @@ from gantrytau_optimica import (
     LaserTracker,
     Measurements,
     calibrate,
-    enough_poses,
-    error_map,
     identifiability,
-    linearity,
     predict,
     select_poses,
 )
+from gantrytau_optimica.calibration import enough_poses, error_map, linearity
 
 ARMS = range(3)
 NOISE = 10e-6  # m, of each measured coordinate

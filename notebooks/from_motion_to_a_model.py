@@ -30,17 +30,15 @@ from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, c
 from gantrytau_optimica import (
     MotionLog,
     Rig,
-    Scatter,
     StepResponse,
-    compare,
     design_excitation,
     identify,
     identify_friction,
     identify_servo,
     identify_system,
-    measured_response,
-    printed_models,
 )
+from gantrytau_optimica.identification import compare, measured_response, printed_models
+from gantrytau_optimica.learning import Scatter
 
 ARMS = range(3)
 CENTRE, HALF = (

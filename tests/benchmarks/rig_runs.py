@@ -6,7 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_optimica import Scatter, design_q, uncertain
+from gantrytau_optimica import design_q
+from gantrytau_optimica.learning import Scatter, uncertain
 from tests.benchmarks.table import Row, at_most
 from tests.optimica.learning.design.test_q_search import sampled
 from tests.optimica.learning.flexible_runs import PERIOD, PLACE, RECORD, flexible_rig

@@ -101,7 +101,7 @@ def test_known_messages_are_in_the_catalogue():
     text = "\n".join(page for _, page in error_pages())
     for words in (
         "Kinematics: found no orientation R, expected one, as this robot can turn its plate",
-        "simulate: found tolerance=⟨tolerance⟩, expected a number between 0 and 1, as 1e-8",
+        "calibrate: constraints= with method=⟨asked⟩, expected method='ipopt', which alone keeps them",
         "exchange the two",
         "export or fetch the file again",
     ):
@@ -147,6 +147,7 @@ def test_pages_of_trees_are_there():
         "messages/index.md",
         "thesis/index.md",
         "command_line/index.md",
+        "sources/index.md",
     }
     index = (ROOT / "notebooks/site/index.md").read_text()
     for body in re.findall(r"```\{toctree\}\n(.*?)```", index, re.DOTALL):

@@ -18,7 +18,7 @@ from gantrytau.commands.calibrate.outcome import NominalRobot, finish
 from gantrytau.commands.calibrate.plan_command import EXAMPLES, model_of_cell, plan
 from gantrytau.commands.printing.reporting import CommandError, refusing, reporting
 from gantrytau_optimica import calibrate as calibrated
-from gantrytau_optimica import cell_example, is_planned, load_planned_cell
+from gantrytau_optimica.procedure import cell_example, is_planned, load_planned_cell
 
 Source = Annotated[
     Path | None,

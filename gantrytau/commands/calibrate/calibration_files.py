@@ -8,7 +8,8 @@ from pathlib import Path
 
 from gantrytau import parameter_text
 from gantrytau.commands.printing.reporting import CommandError
-from gantrytau_optimica import About, Calibration, calibrated_geometry, frame_words, write_report
+from gantrytau_optimica import Calibration
+from gantrytau_optimica.calibration import About, calibrated_geometry, frame_words, write_report
 
 PARAMETERS = "calibrated.toml"
 REPORT = "report.html"

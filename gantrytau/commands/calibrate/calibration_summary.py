@@ -9,15 +9,15 @@ import typer
 from gantrytau.commands.calibrate.calibration_files import PARAMETERS
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile
 from gantrytau.commands.printing.reporting import print_table
-from gantrytau_optimica import (
+from gantrytau_optimica import Calibration
+from gantrytau_optimica.calibration import (
     About,
-    Calibration,
     CalibrationVerdict,
     CrossValidation,
-    MeasuredPlan,
     parameter_rows,
     report_numbers,
 )
+from gantrytau_optimica.procedure import MeasuredPlan
 
 
 def about(

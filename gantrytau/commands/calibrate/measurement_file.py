@@ -10,15 +10,8 @@ import numpy as np
 from gantrytau import Model
 from gantrytau.commands.printing.reporting import FAULT, CommandError, busy, fail, refusing
 from gantrytau.commands.printing.spelling import RUNNING, spelled
-from gantrytau_optimica import (
-    CalibrationError,
-    CrossValidation,
-    Finding,
-    Measurements,
-    calibrate,
-    cross_validate,
-    held_out,
-)
+from gantrytau_optimica import CalibrationError, Finding, Measurements, calibrate, cross_validate
+from gantrytau_optimica.calibration import CrossValidation, held_out
 
 OF_GUIDEWAYS = "guideway"  # findings whose rows are those of a guideway
 

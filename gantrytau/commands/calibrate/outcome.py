@@ -11,7 +11,8 @@ from gantrytau import Model, ModelError
 from gantrytau.commands.calibrate import calibration_files, calibration_summary
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile, calibrated
 from gantrytau.commands.printing.reporting import FAULT, answered, note, writable
-from gantrytau_optimica import MeasuredPlan, PlannedCell, measured_plan, told_by_tool
+from gantrytau_optimica.calibration import told_by_tool
+from gantrytau_optimica.procedure import MeasuredPlan, PlannedCell, measured_plan
 
 FEW = 60  # poses, fewer than which are all fitted, and left out in turn
 LAID_OVER = (

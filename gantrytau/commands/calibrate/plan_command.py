@@ -22,7 +22,8 @@ from gantrytau.commands.printing.reporting import (
     refusing,
 )
 from gantrytau.commands.printing.spelling import RUNNING
-from gantrytau_optimica import CalibrationPlan, PlannedCell, plan_cell, read_cell
+from gantrytau_optimica import CalibrationPlan, read_cell
+from gantrytau_optimica.procedure import PlannedCell, plan_cell
 
 EXAMPLES = ("l1", "six", "f1")  # kinds of cells to begin with
 STAGES = {

@@ -19,8 +19,9 @@ from gantrytau.commands.printing.reporting import (
     reporting,
     written,
 )
-from gantrytau_optimica import Finding, Identification, MotionLog, check_motion
+from gantrytau_optimica import Finding, Identification, MotionLog
 from gantrytau_optimica import identify as identified
+from gantrytau_optimica.identification import check_motion
 
 MANY = 100  # rows of a finding that are listed
 Logs = Annotated[

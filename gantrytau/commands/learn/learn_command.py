@@ -11,7 +11,8 @@ from gantrytau import GantryTauError
 from gantrytau.commands.arguments.option import printing, serves
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import INTERRUPTED, answered, fail, note, refusing, reporting
-from gantrytau_optimica import RIG_EXAMPLE, LearntCases, learn_cases, plot_learning, read_rig
+from gantrytau_optimica import learn_cases, read_rig
+from gantrytau_optimica.learning import RIG_EXAMPLE, LearntCases, plot_learning
 
 PICTURES = ("errors", "input", "path")
 NAMES = {"history": "--output", "learning": "learning", "limit": "open_to", "reference": "reference"} | {

@@ -9,7 +9,7 @@ from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json
 from gantrytau.commands.printing.reporting import FAULT, answered, note, refusing, reporting
-from gantrytau_optimica import load_planned_cell
+from gantrytau_optimica.procedure import load_planned_cell
 from gantrytau_optimica.vision import Light, rehearse_plan
 
 

@@ -22,6 +22,7 @@ MANUAL = {  # page of a folder -> page of the site
     "gantrytau/ensembles/README.md": "manual/ensembles.md",
     "models/README.md": "manual/models.md",
     "optimica/README.md": "manual/optimica.md",
+    "optimica/gantrytau_optimica/fitting/README.md": "manual/fitting.md",
     "fmu/README.md": "manual/fmu.md",
     "fmu/PROTOCOL.md": "manual/protocol.md",
     "notebooks/README.md": "notebooks/index.md",

@@ -6,3 +6,30 @@ the result, which `documents` write and `calibration_plan` hands over. `cells` a
 `measured_plan` what became of it. A robot before its calibration is known to the tape measure only: whatever has to be safe
 is asked of a `fleet` of robots that the tape measure cannot tell apart.
 """
+
+from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan, load_plan
+from gantrytau_optimica.procedure.cells.cell_example import cell_example
+from gantrytau_optimica.procedure.cells.cell_file import Cell, read_cell
+from gantrytau_optimica.procedure.cells.planned_cell import (
+    PlannedCell,
+    is_planned,
+    load_planned_cell,
+    plan_cell,
+)
+from gantrytau_optimica.procedure.measured_plan import MeasuredPlan, measured_plan
+from gantrytau_optimica.procedure.plan_calibration import plan_calibration
+
+__all__ = [
+    "CalibrationPlan",
+    "Cell",
+    "MeasuredPlan",
+    "PlannedCell",
+    "cell_example",
+    "is_planned",
+    "load_plan",
+    "load_planned_cell",
+    "measured_plan",
+    "plan_calibration",
+    "plan_cell",
+    "read_cell",
+]

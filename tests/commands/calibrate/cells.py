@@ -9,7 +9,8 @@ import numpy as np
 
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import LaserTracker, cell_example
+from gantrytau_optimica import LaserTracker
+from gantrytau_optimica.procedure import cell_example
 
 SMALL = {"poses": "poses = 20", "robots": "robots = 2\nspacing = 0.25"}
 TAPE = 0.005  # m, as the example says

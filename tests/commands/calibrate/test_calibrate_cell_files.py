@@ -2,7 +2,7 @@
 
 import pytest
 
-from gantrytau_optimica import cell_example
+from gantrytau_optimica.procedure import cell_example
 from tests.commands.calibrate.cells import with_lines
 
 FAULT, MISUSE = 1, 2

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from gantrytau.commands.app import app
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica import Measurements, calibrate, told_by_tool
+from gantrytau_optimica import Measurements, calibrate
+from gantrytau_optimica.calibration import told_by_tool
 from gantrytau_optimica.calibration.design.identifiability import PoseArrays
 from gantrytau_optimica.calibration.diagnostics.tool_error import tool_error
 from tests.commands.calibrate import cells

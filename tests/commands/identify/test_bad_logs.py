@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gantrytau import GantryTauError
-from gantrytau_optimica import MotionLog, check_motion, identify
+from gantrytau_optimica import MotionLog, identify
+from gantrytau_optimica.identification import check_motion
 from tests.optimica.identification import gantry_logs
 
 GOOD = slice(4000, 6500)  # the end of the slow part and the fast one, 10 s

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from gantrytau_optimica import RIG_EXAMPLE, History, read_rig
+from gantrytau_optimica import History, read_rig
+from gantrytau_optimica.learning import RIG_EXAMPLE
 
 PLANT = """\
 from tests.optimica.learning.runs.linear_plant import LinearPlant

@@ -11,7 +11,8 @@ from gantrytau import Result, prbs
 from gantrytau.mechanics.translational import Friction
 from gantrytau_models import FlexibleGantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_optimica import Rig, Scatter
+from gantrytau_optimica import Rig
+from gantrytau_optimica.learning import Scatter
 
 RECORD = prototypes.L1_flexible
 PERIOD = 0.004

@@ -6,7 +6,8 @@ import pytest
 from gantrytau import linearize
 from gantrytau_models import FlexibleGantryTau
 from gantrytau_models.mechanisms.flexible import unstretched
-from gantrytau_optimica import Scatter, identify_system
+from gantrytau_optimica import identify_system
+from gantrytau_optimica.learning import Scatter
 from tests.optimica.learning.flexible_runs import (
     PERIOD,
     PLACE,

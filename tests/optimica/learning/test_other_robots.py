@@ -13,20 +13,8 @@ from gantrytau import Input, Model, ModelError, Parameter, Real, der
 from gantrytau.mechanics.translational import Force, Mass
 from gantrytau_fmu import cosimulate, export_fmu
 from gantrytau_models import CartServo, DeltaRobot, JointServo
-from gantrytau_optimica import (
-    Gradient,
-    Learning,
-    NormOptimal,
-    Reference,
-    Rig,
-    Scatter,
-    StraightAxes,
-    Tukey,
-    ZeroPhase,
-    learn,
-    read_corrections,
-    square_reference,
-)
+from gantrytau_optimica import Gradient, Learning, NormOptimal, Rig, Tukey, ZeroPhase, learn, square_reference
+from gantrytau_optimica.learning import Reference, Scatter, StraightAxes, read_corrections
 from gantrytau_optimica.learning.runs.corrections_file import write_corrections
 
 PERIOD = 0.004

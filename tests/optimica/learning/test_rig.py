@@ -16,7 +16,8 @@ from gantrytau_models import (
     cart_servos,
     prototypes,
 )
-from gantrytau_optimica import Rig, Scatter, StepResponse, identify_servo
+from gantrytau_optimica import Rig, StepResponse, identify_servo
+from gantrytau_optimica.learning import Scatter
 
 RECORD = prototypes.L1_flexible
 POLES = np.array([0.9647, 0.9656, 0.9728])  # (6.11)

@@ -6,7 +6,8 @@ import numpy as np
 
 from gantrytau.kinematics import Box, Limits
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
-from gantrytau_optimica import LaserTracker, TMac
+from gantrytau_optimica import LaserTracker
+from gantrytau_optimica.calibration import TMac
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from gantrytau_optimica.calibration.links.arm_factors import scales
 

@@ -8,17 +8,8 @@ import pytest
 from gantrytau import ModelError, translate
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import (
-    LaserTracker,
-    Measurements,
-    cell_example,
-    cross_validate,
-    is_planned,
-    load_planned_cell,
-    measured_plan,
-    plan_cell,
-    read_cell,
-)
+from gantrytau_optimica import LaserTracker, Measurements, cross_validate, read_cell
+from gantrytau_optimica.procedure import cell_example, is_planned, load_planned_cell, measured_plan, plan_cell
 from tests.optimica.refusals import refused
 
 SMALL = {"poses = 40": "poses = 14", "robots = 20": "robots = 2\nspacing = 0.25"}

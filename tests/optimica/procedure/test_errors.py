@@ -10,7 +10,8 @@ import pytest
 from gantrytau import ModelError
 from gantrytau.kinematics import Box
 from gantrytau_models import FourBar
-from gantrytau_optimica import LaserTracker, LengthGauge, load_plan, plan_calibration
+from gantrytau_optimica import LaserTracker, load_plan, plan_calibration
+from gantrytau_optimica.calibration import LengthGauge
 from gantrytau_optimica.procedure import robot_samples as fleet
 from tests.optimica.procedure import cells
 from tests.optimica.procedure.cells import varied

@@ -10,14 +10,8 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import F1GantryTau, prototypes
-from gantrytau_optimica import (
-    LaserTracker,
-    Measurements,
-    calibrate,
-    load_plan,
-    plan_calibration,
-    stereo_cameras,
-)
+from gantrytau_optimica import LaserTracker, Measurements, calibrate, load_plan, plan_calibration
+from gantrytau_optimica.calibration import stereo_cameras
 from gantrytau_optimica.procedure.motion_planning.clear_ways import clear_ways
 from tests.optimica.procedure import cells
 from tests.optimica.procedure.cells import varied

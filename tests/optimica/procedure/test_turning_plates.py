@@ -6,7 +6,8 @@ import pytest
 from gantrytau.kinematics import Limits
 from gantrytau.kinematics.rotations import angle_between
 from gantrytau_models import F1GantryTau, prototypes
-from gantrytau_optimica import TMac, plan_calibration
+from gantrytau_optimica import plan_calibration
+from gantrytau_optimica.calibration import TMac
 from gantrytau_optimica.procedure.documents.plan_page import html_page
 from tests.optimica.procedure import cells
 

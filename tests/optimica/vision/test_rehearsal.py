@@ -6,7 +6,8 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import LaserTracker, Measurements, load_planned_cell, plan_cell, read_cell
+from gantrytau_optimica import LaserTracker, Measurements, read_cell
+from gantrytau_optimica.procedure import load_planned_cell, plan_cell
 from gantrytau_optimica.vision import rehearse_plan
 
 CELL = """\

@@ -3,7 +3,7 @@
 import enum
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 from notebooks.site.builder.generated.component_tables import table
 from notebooks.site.builder.reading.docstrings import escaped, summary
@@ -31,7 +31,8 @@ def command_page() -> str:
 
 def _commands(group: Any, path: str) -> Iterator[tuple[str, Any]]:
     """All commands below a group, by what is typed."""
-    for name, command in group.commands.items():
+    for name in group.list_commands(None):
+        command = group.get_command(None, name)
         if hasattr(command, "commands"):
             yield from _commands(command, f"{path} {name}")
         else:
@@ -62,7 +63,13 @@ def _name(one: Any) -> str:
         return one.metavar or one.name.upper()
     names = "/".join((", ".join(reversed(one.opts)), *one.secondary_opts))
     kind = getattr(getattr(one, "type_descriptor", None), "annotation", None)
-    return names if one.is_flag else f"{names} {one.metavar or WORDS.get(kind, 'VALUE')}"
+    return names if one.is_flag else f"{names} {one.metavar or _choices(kind) or WORDS.get(kind, 'VALUE')}"
+
+
+def _choices(kind: Any) -> str:
+    """The words of an option that takes one of them."""
+    parts = [part for one in (kind, *get_args(kind)) if get_origin(one) is Literal for part in get_args(one)]
+    return "|".join(map(str, parts))
 
 
 def _default(one: Any) -> str:

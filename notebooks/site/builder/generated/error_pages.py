@@ -17,6 +17,9 @@ or what it expected. Search for a few words of a message: it is on one of these 
 """
 GENERAL = """## In general
 
+- `name: found argument=value, expected ...`: the argument of a function is no word of its list, no number within its limits,
+  of another shape, or not finite. These are checked alike everywhere and stand on no page; what an argument takes stands in
+  the reference. Words are case-sensitive; a text brings its unit, "700 mm", where a quantity has one.
 - An error that has to do with one argument carries its name, `error.argument`; the command line names its option.
 - `InitializationError`: begin near a pose that exists, by `Start(...)`; `check(model)` says what had to move, and what is
   missing.

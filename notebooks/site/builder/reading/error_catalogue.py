@@ -89,7 +89,7 @@ def _of_module(name: str, tree: ast.Module, kinds: set[str], functions: Function
         if text is None:
             continue
         scope = Scope(top | (assignments(owner) if owner else {}), functions)
-        said, remedy = split(words(text, scope))
+        said, remedy = split(_sentence(node, place, scope) if called in kinds else words(text, scope))
         said = said if called != "require" else f"⟨path⟩: {said}"
         if not re.search(r"[a-z]{3}", re.sub("⟨.*?⟩", "", said + remedy)):
             continue  # a message that was made elsewhere, passed on
@@ -97,6 +97,15 @@ def _of_module(name: str, tree: ast.Module, kinds: set[str], functions: Function
         kind = "ModelError" if called == "require" else called
         asked = wrong.value if isinstance(wrong, ast.Constant) and isinstance(wrong.value, str) else ""
         yield Message(kind, name, node.lineno, said, remedy, asked)
+
+
+def _sentence(node: ast.Call, place: int, scope: Scope) -> str:
+    """The words of an error: its place, what was found, and the parts of its message."""
+    facts = {keyword.arg: words(keyword.value, scope) for keyword in node.keywords if keyword.arg}
+    where = f"{facts['place']}: " if "place" in facts else ""
+    found = f"found {facts['found']}, " if "found" in facts else ""
+    parts = [words(part, scope) for part in node.args[place:]] or [facts.get("message", "")]
+    return where + found + "".join(parts)
 
 
 def _calls(tree: ast.Module) -> Iterator[tuple[ast.FunctionDef | None, ast.Call]]:

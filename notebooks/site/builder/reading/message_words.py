@@ -79,12 +79,20 @@ def _called(node: ast.Call, scope: Scope) -> str:
     name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
     if name in KNOWN:
         return KNOWN[name]
+    if name == "Given" and node.args:
+        value = _literal(node.args[1], scope) if len(node.args) > 1 else ""
+        return f"{words(node.args[0], scope)}={value}"
     function = scope.functions.get(name)
     if function is not None and scope.depth < DEEP:
         returned = [n.value for n in ast.walk(function) if isinstance(n, ast.Return) and n.value is not None]
         if len(returned) == 1 and is_text(returned[0]):
             return words(returned[0], replace(scope.deeper(), assigned=assignments(function)))
     return f"⟨{spoken(node)}⟩"
+
+
+def _literal(node: ast.expr, scope: Scope) -> str:
+    """A value as Python writes it, where it is written down."""
+    return repr(node.value) if isinstance(node, ast.Constant) else words(node, scope)
 
 
 def spoken(node: ast.expr) -> str:

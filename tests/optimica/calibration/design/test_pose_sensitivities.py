@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from gantrytau import ModelError
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import F1GantryTau, GantryTau, Pendulum, SixLinkGantryTau, prototypes
-from gantrytau_optimica import Measurements, pose_sensitivities, sensitivity_table
+from gantrytau_optimica import Measurements
+from gantrytau_optimica.calibration import pose_sensitivities, sensitivity_table
 from gantrytau_optimica.calibration.links.arm_closure import read_arms
 from gantrytau_optimica.calibration.links.arm_poses import poses_of
 from tests.optimica.calibration.linear_data import carts, six_link_poses, three_link_poses

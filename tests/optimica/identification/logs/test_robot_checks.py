@@ -6,7 +6,8 @@ import pytest
 from gantrytau import ModelError, translate
 from gantrytau.kinematics.kinematics import Kinematics, driven_joints
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import MotionLog, check_motion
+from gantrytau_optimica import MotionLog
+from gantrytau_optimica.identification import check_motion
 from gantrytau_optimica.identification.logs.log_checks import slopes
 from gantrytau_optimica.identification.logs.robot_checks import nominal_forces
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_optimica import IdentificationError, StepResponse, identify_servo
+from gantrytau_optimica import StepResponse, identify_servo
+from gantrytau_optimica.identification import IdentificationError
 
 POLE, GAIN = np.array([0.9647, 0.9656, 0.9728]), np.array([0.03527, 0.03425, 0.02748])  # (6.11), as printed
 DELAY, PERIOD = 5, 0.004

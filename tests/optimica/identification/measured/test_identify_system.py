@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import block_diag
 
 from gantrytau import ModelError, StateSpace, prbs
-from gantrytau_optimica import IdentificationError, identify_system
+from gantrytau_optimica import identify_system
+from gantrytau_optimica.identification import IdentificationError
 
 PERIOD = 0.004
 HERTZ, DAMPING = [7.4, 10.5, 11.5, 45.0], [0.03, 0.05, 0.05, 0.05]

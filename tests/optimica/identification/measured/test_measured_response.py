@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, StateSpace
-from gantrytau_optimica import measured_response
+from gantrytau_optimica.identification import measured_response
 
 PERIOD = 0.004
 SYSTEM = StateSpace(

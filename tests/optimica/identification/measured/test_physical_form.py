@@ -6,7 +6,8 @@ import scipy.linalg
 
 from gantrytau import ModelError, StateSpace, linearize
 from gantrytau_models import prototypes
-from gantrytau_optimica import IdentificationError, MechanicalForm, physical_form
+from gantrytau_optimica import physical_form
+from gantrytau_optimica.identification import IdentificationError, MechanicalForm
 from tests.models.mechanisms.test_impulses import at_rest
 
 PERIOD = 0.004  # s

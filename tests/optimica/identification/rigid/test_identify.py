@@ -8,7 +8,8 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import IdentificationError, MotionLog, identify
+from gantrytau_optimica import MotionLog, identify
+from gantrytau_optimica.identification import IdentificationError
 from gantrytau_optimica.identification.rigid.robot_dynamics import (
     RobotDynamics,
     candidates,

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import FURTHER_MODELS, TABLE_6_3, compare, printed_models
+from gantrytau_optimica.identification import FURTHER_MODELS, TABLE_6_3, compare, printed_models
 from tests.optimica.identification import gantry_logs as logs
 
 COULOMB = np.array([[189.12, 145.69], [262.59, 119.23], [239.06, 177.22]])  # N, Table 6.1

@@ -11,22 +11,18 @@ import pytest
 from gantrytau import Result
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_optimica import (
-    Actuators,
     Complementary,
     History,
     Kalman,
     Learning,
-    LearningError,
     Measured,
     Rig,
-    Scatter,
     Tukey,
-    arm_model,
     design_q,
-    estimated_response,
     learn,
     square_reference,
 )
+from gantrytau_optimica.learning import Actuators, LearningError, Scatter, arm_model, estimated_response
 from gantrytau_optimica.learning.runs.robot_runs import forward_speed
 from tests.optimica.learning.runs.linear_plant import RESPONSE
 

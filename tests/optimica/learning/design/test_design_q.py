@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import block_diag
 
 from gantrytau import ModelError, StateSpace
-from gantrytau_optimica import Gradient, Learning, ZeroPhase, design_q, plot_q, uncertain
+from gantrytau_optimica import Gradient, Learning, ZeroPhase, design_q
+from gantrytau_optimica.learning import plot_q, uncertain
 from gantrytau_optimica.learning.laws.lifted import pulses
 
 PERIOD = 0.004

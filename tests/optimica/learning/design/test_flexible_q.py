@@ -6,16 +6,8 @@ import pytest
 from gantrytau import prbs
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
-from gantrytau_optimica import (
-    Learning,
-    Rig,
-    Scatter,
-    ZeroPhase,
-    design_q,
-    identify_system,
-    square_reference,
-    uncertain,
-)
+from gantrytau_optimica import Learning, Rig, ZeroPhase, design_q, identify_system, square_reference
+from gantrytau_optimica.learning import Scatter, uncertain
 
 PERIOD, ROWS, REST = 0.004, 3100, 100
 RECORD = prototypes.L1_flexible

@@ -7,7 +7,8 @@ import pytest
 from scipy.linalg import block_diag
 
 from gantrytau import ModelError, StateSpace
-from gantrytau_optimica import Learning, Tukey, ZeroPhase, design_q, uncertain
+from gantrytau_optimica import Learning, Tukey, ZeroPhase, design_q
+from gantrytau_optimica.learning import uncertain
 from gantrytau_optimica.learning.design.q_search import QProblem
 
 PERIOD = 0.004

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError, Result
-from gantrytau_optimica import Actuators, Complementary, Kinematic, Measured, plot_estimates
+from gantrytau_optimica import Complementary, Kinematic, Measured
+from gantrytau_optimica.learning import Actuators, plot_estimates
 from tests.optimica.learning.estimators.analytic_runs import PERIOD, PLACE, l1_kinematics, run_of, swung_ramp
 
 KINEMATICS = l1_kinematics()

@@ -14,11 +14,11 @@ from gantrytau_optimica import (
     Kalman,
     Kinematic,
     Measured,
-    Scatter,
     Tukey,
     identify_system,
     square_reference,
 )
+from gantrytau_optimica.learning import Scatter
 from tests.optimica.learning.flexible_runs import (
     PERIOD,
     PLACE,

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 from gantrytau import Result, StateSpace
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica import Reference
+from gantrytau_optimica.learning import Reference
 
 PERIOD = 0.004
 SERVOS = [(0.03527, 0.9647), (0.03425, 0.9656), (0.02748, 0.9728)]  # b and a of (6.11)

@@ -8,21 +8,18 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_optimica import (
-    Actuators,
     Complementary,
     Gradient,
     History,
     Kinematic,
     Learning,
-    LearningError,
     Measured,
     NormOptimal,
-    Reference,
     Tukey,
     ZeroPhase,
-    estimated_response,
     learn,
 )
+from gantrytau_optimica.learning import Actuators, LearningError, Reference, estimated_response
 from gantrytau_optimica.learning.laws.lifted import lifted
 from tests.optimica.learning.runs.linear_plant import (
     DELAY,

@@ -6,17 +6,8 @@ import pytest
 from gantrytau import ModelError, Result
 from gantrytau.kinematics import Kinematics
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
-from gantrytau_optimica import (
-    Learning,
-    LearningError,
-    Rig,
-    Scatter,
-    Tukey,
-    learn,
-    read_corrections,
-    repeat,
-    square_reference,
-)
+from gantrytau_optimica import Learning, Rig, Tukey, learn, square_reference
+from gantrytau_optimica.learning import LearningError, Scatter, read_corrections, repeat
 from tests.optimica.learning.runs.linear_plant import RESPONSE, LinearPlant, line
 
 WINDOW = Tukey(0.2, lead=0.2)

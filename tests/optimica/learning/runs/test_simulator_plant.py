@@ -8,18 +8,13 @@ import pytest
 from gantrytau import ModelError, Result
 from gantrytau_fmu import cosimulate, export_fmu
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
-from gantrytau_optimica import (
-    Learning,
+from gantrytau_optimica import Learning, Measured, Rig, Tukey, learn, square_reference
+from gantrytau_optimica.learning import (
     LearningError,
-    Measured,
-    Rig,
     Scatter,
     SimulatorPlant,
     StraightAxes,
-    Tukey,
     estimated_response,
-    learn,
-    square_reference,
 )
 from tests.optimica.learning.runs.linear_plant import KINEMATICS, PERIOD, RESPONSE, line
 
