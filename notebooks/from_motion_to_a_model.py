@@ -37,7 +37,7 @@ from gantrytau_optimica import (
     identify_servo,
     identify_system,
 )
-from gantrytau_optimica.identification import compare, measured_response, printed_models
+from gantrytau_optimica.identification import compare_models, measured_response, printed_models
 from gantrytau_optimica.learning import Scatter
 
 ARMS = range(3)
@@ -221,7 +221,7 @@ models = {
     f"model {name}": model | dict(minimum_speed=0.2)
     for name, model in printed_models(friction.coulomb, friction.viscous).items()
 }
-table = compare(drawn, later, models)
+table = compare_models(drawn, later, models)
 print(table)
 assert table.ranking == ("model 2", "model 4", "model 1", "model 3")
 

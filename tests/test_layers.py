@@ -42,10 +42,6 @@ READMES = {  # the page with the map of a folder
     "gantrytau_fmu": ROOT / "fmu" / "README.md",
 }
 FILES_IN_A_FOLDER, FILES_IN_THE_ROOT, LINES, LINES_OF_A_FUNCTION, ARGUMENTS = 14, 8, 400, 60, 8
-SHARED_CLASSES = {  # each is the word of its field, and public
-    "Camera",  # a device that stands somewhere, and one of which only images are known
-    "Pattern",  # of a sparse matrix, and that which cameras look for
-}
 COMPONENTS = (
     "gantrytau.mechanics.",
     "gantrytau.blocks.",
@@ -205,9 +201,7 @@ def named_twice(files: House) -> Iterator[str]:
         for node in file.nodes
         if isinstance(node, ast.ClassDef)
     )
-    yield from (
-        f"class {name} {n} times" for name, n in classes.items() if n > 1 and name not in SHARED_CLASSES
-    )
+    yield from (f"class {name} {n} times" for name, n in classes.items() if n > 1)
 
 
 def peeks(files: House) -> Iterator[str]:
@@ -338,8 +332,6 @@ OFFENCES = {  # rule -> files of a house, and what is said of them
         {
             "gantrytau/figures": "class A: ...",
             "gantrytau/results/figures": "class A: ...\nclass B: ...",
-            "gantrytau/results/graph": "class Camera: ...",
-            "gantrytau/writing/graph": "class Camera: ...",
             "gantrytau/mechanics/rotational": "class B: ...",
         },
         {"class A 2 times"},

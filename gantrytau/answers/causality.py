@@ -9,7 +9,7 @@ import casadi as ca
 from gantrytau.answers.function_through import Question, function_through
 from gantrytau.answers.implicit_blocks import one_where
 from gantrytau.border.refusal import ModelError, StructureError
-from gantrytau.compiler.blocks.pattern import Pattern, block_pattern
+from gantrytau.compiler.blocks.pattern import SparsityPattern, block_pattern
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.request import Request, names
 from gantrytau.compiler.translated import Translated, carefully, solved
@@ -122,7 +122,7 @@ def _known(dae: Translated, given: Sequence[str], columns: list[list[ca.SX]]) ->
     return known
 
 
-def _pattern(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX]) -> Pattern | None:
+def _pattern(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX]) -> SparsityPattern | None:
     """Blocks that lead from the known symbols to the targets, or None where they do not determine them."""
     unknowns = [n for n in dae.symbols if n not in known]
     wanted = [leaf.name() for leaf in ca.symvar(ca.vertcat(*targets)) if leaf.name() not in known]
@@ -203,7 +203,9 @@ def _answered(
     return through("f", question, quick, lambda: carefully(dae, quick), dae.start)
 
 
-def _asked(dae, pattern: Pattern, known, targets, given, find, columns) -> tuple[Question, SolvedBlocks]:
+def _asked(
+    dae, pattern: SparsityPattern, known, targets, given, find, columns
+) -> tuple[Question, SolvedBlocks]:
     """What is asked of the blocks of a pattern, and these blocks."""
     numbers = {n: dae.table.values[n] for n in dae.table.independent if n not in known}
     definitions: list[tuple[ca.SX, ca.SX]] = [(dae.table.symbols[n], ca.SX(v)) for n, v in numbers.items()]

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
-from gantrytau.compiler.blocks.pattern import Pattern
+from gantrytau.compiler.blocks.pattern import SparsityPattern
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block, SolvedBlocks, solve_anew, solve_blocks
 from gantrytau.compiler.index_reduction import Indexed, Key
@@ -242,7 +242,7 @@ def origin_of(dae: Translated, block: Block) -> Origin:
     )
 
 
-def solved(dae: Translated, pattern: Pattern) -> SolvedBlocks:
+def solved(dae: Translated, pattern: SparsityPattern) -> SolvedBlocks:
     """Blocks of its equations, solved in the order of a pattern."""
     guide = Guide(dae.start, dae.parameter_values, dae.choice.states)
     return solve_blocks(pattern.blocks, dae.indexed.residuals, _symbols(dae, pattern.blocks), guide)

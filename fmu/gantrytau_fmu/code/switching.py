@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 
 from gantrytau import Dae
-from gantrytau.compiler.blocks.pattern import Pattern
+from gantrytau.compiler.blocks.pattern import SparsityPattern
 from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.compiler.system import System
 from gantrytau.compiler.translated import solved
@@ -78,7 +78,7 @@ def written(dae: Dae) -> WithModes:
         dae = replace(dae, start={**dae.start, **pieces.numbers(point)})
     if modes & {leaf.name() for leaf in ca.symvar(column(list(pieces.residuals.values())))}:
         dae = replace(dae, indexed=replace(dae.indexed, residuals=pieces.residuals))
-        pattern = Pattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
+        pattern = SparsityPattern(tuple((b.equations, b.unknowns) for b in dae.blocks), (), ())
         dae = replace(dae, blocks=solved(dae, pattern).blocks)
     past = pieces.conditions[len(pieces.conditions) - len(dae.flat.delays) :]
     return WithModes(dae, pieces, laws, tuple(found[count:]), past)

@@ -9,7 +9,7 @@ from gantrytau.language.symbols import Derivative, split_derivative
 
 
 @dataclass(frozen=True, eq=False)
-class Pattern:
+class SparsityPattern:
     """Ordered blocks, each (equations, unknowns), and what is left over.
 
     undetermined: wanted names that the equations do not determine; surplus: equations without an unknown.
@@ -24,7 +24,7 @@ def block_pattern(
     incidence: Mapping[Key, Collection[Derivative]],
     unknowns: Iterable[str],
     wanted: Iterable[str] | None = None,
-) -> Pattern:
+) -> SparsityPattern:
     """The blocks that determine `wanted` (None: all unknowns), as small as possible, in the order of their solution.
 
     incidence: which derivatives stand in each equation; unknowns and wanted by name.
@@ -41,7 +41,7 @@ def block_pattern(
     needed = {block_of[place[n]] for n in targets if n not in undetermined}
     order = _in_order(sorted(needed, key=lambda k: found.blocks[k]), needs)
     blocks = (found.blocks[k] for k in order)
-    return Pattern(
+    return SparsityPattern(
         tuple((tuple(keys[i] for i in own), tuple(names[j] for j in columns)) for own, columns in blocks),
         undetermined,
         tuple(keys[i] for i in found.surplus),

@@ -24,7 +24,12 @@ from gantrytau_optimica.calibration.design.pose_selection import enough_poses, p
 from gantrytau_optimica.calibration.design.pose_sensitivities import PoseSensitivities, pose_sensitivities
 from gantrytau_optimica.calibration.design.sensitivity_table import SensitivityTable, sensitivity_table
 from gantrytau_optimica.calibration.devices.accelerometers import Accelerometer
-from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices.cameras import (
+    Cameras,
+    PlacedCamera,
+    single_camera,
+    stereo_cameras,
+)
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice
@@ -47,13 +52,13 @@ __all__ = [
     "Calibration",
     "CalibrationError",
     "CalibrationVerdict",
-    "Camera",
     "Cameras",
     "CrossValidation",
     "LaserTracker",
     "LengthGauge",
     "Measurements",
     "ParameterRow",
+    "PlacedCamera",
     "PoseSensitivities",
     "SampledDevice",
     "SensitivityTable",

@@ -14,7 +14,7 @@ from gantrytau_optimica.identification.rigid.model_comparison import (
     FURTHER_MODELS,
     TABLE_6_3,
     ModelComparison,
-    compare,
+    compare_models,
     printed_models,
 )
 from gantrytau_optimica.identification.rigid.robot_dynamics import IdentificationError
@@ -41,7 +41,7 @@ __all__ = [
     "ServoModel",
     "StepResponse",
     "check_motion",
-    "compare",
+    "compare_models",
     "design_excitation",
     "identify",
     "identify_friction",

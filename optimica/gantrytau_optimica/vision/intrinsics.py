@@ -12,8 +12,7 @@ from gantrytau.border.checks import array
 from gantrytau.border.refusal import Given
 from gantrytau.border.schema import Value, read_table
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.devices.cameras import UP
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import UP, PlacedCamera
 
 Array = np.ndarray
 LENS = 5  # k1, k2, p1, p2, k3

@@ -19,8 +19,7 @@ from gantrytau_optimica.calibration.assessment.calibration_acceptance import Cal
 from gantrytau_optimica.calibration.assessment.cross_validation import cross_validate
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
-from gantrytau_optimica.calibration.devices.cameras import Cameras
+from gantrytau_optimica.calibration.devices.cameras import Cameras, PlacedCamera
 from gantrytau_optimica.procedure.cells.planned_cell import PlannedCell
 from gantrytau_optimica.procedure.measured_plan import measured_plan
 from gantrytau_optimica.procedure.robot_samples import Member, build_fleet

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from gantrytau_models import SixLinkGantryTau, prototypes
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.vision import Camera, Detections, Images, Light, Pattern, Scene, render, true_corners
 
 SIDE = 0.06  # m

@@ -36,7 +36,7 @@ STRAIGHT_AHEAD = 1e-3  # m, points nearer to the plane of the lens or behind it 
 
 
 @dataclass(frozen=True, eq=False)
-class Camera(Record):
+class PlacedCamera(Record):
     """A pinhole camera with lens distortion.
 
     r: centre of projection in the world, (3,) in m; R: its axes in the world, x to the right, y down, z ahead. focal:
@@ -54,21 +54,25 @@ class Camera(Record):
     distortion: Any = (0.0, 0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self):
-        if not np.all(array("Camera", "size", self.size, (2,)) > 0):
+        if not np.all(array("PlacedCamera", "size", self.size, (2,)) > 0):
             raise ModelError(
-                "expected (width, height) in pixels above 0", place="Camera", found=Given("size", self.size)
+                "expected (width, height) in pixels above 0",
+                place="PlacedCamera",
+                found=Given("size", self.size),
             )
         width, height = self.size
         middle = ((width - 1) / 2, (height - 1) / 2)
-        focal = array("Camera", "focal", self.focal, (), (2,))
+        focal = array("PlacedCamera", "focal", self.focal, (), (2,))
         if not np.all(focal > 0):
-            raise ModelError("expected pixels above 0", place="Camera", found=Given("focal", self.focal))
+            raise ModelError(
+                "expected pixels above 0", place="PlacedCamera", found=Given("focal", self.focal)
+            )
         for name, value in (
-            ("r", array("Camera", "r", self.r, (3,))),
-            ("R", checked_rotation("Camera", self.R)),
+            ("r", array("PlacedCamera", "r", self.r, (3,))),
+            ("R", checked_rotation("PlacedCamera", self.R)),
             ("focal", np.broadcast_to(focal, 2)),
-            ("centre", array("Camera", "centre", middle if self.centre is None else self.centre, (2,))),
-            ("distortion", array("Camera", "distortion", self.distortion, (5,))),
+            ("centre", array("PlacedCamera", "centre", middle if self.centre is None else self.centre, (2,))),
+            ("distortion", array("PlacedCamera", "distortion", self.distortion, (5,))),
         ):
             object.__setattr__(self, name, value)
 
@@ -85,15 +89,15 @@ class Camera(Record):
         return float(folds.min(initial=np.inf))
 
     @classmethod
-    def looking(cls, r: Any, at: Any, *, up: Any = UP, **lens: Any) -> "Camera":
-        """A camera at r that looks at a point, the upper edge of its image towards `up`; lens: as of Camera."""
-        r, at, up = (array("Camera", n, a, (3,)) for n, a in (("r", r), ("at", at), ("up", up)))
+    def looking(cls, r: Any, at: Any, *, up: Any = UP, **lens: Any) -> "PlacedCamera":
+        """A camera at r that looks at a point, the upper edge of its image towards `up`; lens: as of PlacedCamera."""
+        r, at, up = (array("PlacedCamera", n, a, (3,)) for n, a in (("r", r), ("at", at), ("up", up)))
         ahead = at - r
         right = np.cross(ahead, up)
         if np.linalg.norm(right) < 1e-9 * np.linalg.norm(ahead) * np.linalg.norm(up) or not np.any(ahead):
             raise ModelError(
                 f"along the view {ahead.tolist()}, expected another direction; name the one that is up in the image",
-                place="Camera",
+                place="PlacedCamera",
                 found=Given("up", up),
             )
         axes = [right, np.cross(ahead, right), ahead]
@@ -164,8 +168,8 @@ class Cameras(Device):
     """
 
     _: KW_ONLY
-    cameras: Sequence[Camera]
-    believed: Sequence[Camera] = ()
+    cameras: Sequence[PlacedCamera]
+    believed: Sequence[PlacedCamera] = ()
     pattern: Any = None
     facing: Any = (0.0, 0.0, 1.0)
     noise: float = 0.1
@@ -176,8 +180,10 @@ class Cameras(Device):
         self._numbers("noise", "smallest", "acceptance", least=0.0)
         for which in ("cameras", "believed"):
             value = getattr(self, which)
-            if not isinstance(value, Sequence) or not all(isinstance(c, Camera) for c in value):
-                raise ModelError("expected a sequence of Camera", place="Cameras", found=Given(which, value))
+            if not isinstance(value, Sequence) or not all(isinstance(c, PlacedCamera) for c in value):
+                raise ModelError(
+                    "expected a sequence of PlacedCamera", place="Cameras", found=Given(which, value)
+                )
         believed = tuple(self.believed) or tuple(self.cameras)
         if not self.cameras or len(believed) != len(self.cameras):
             raise ModelError(
@@ -277,7 +283,7 @@ def single_camera(r: Any, at: Any, *, up: Any = UP, lens_error: float = LENS_ERR
     `stereo_cameras`); policy: as of Cameras.
     """
     number("single_camera", "lens_error", lens_error)
-    return _with_lens_error([Camera.looking(r, at, up=up)], lens_error, policy)
+    return _with_lens_error([PlacedCamera.looking(r, at, up=up)], lens_error, policy)
 
 
 def stereo_cameras(
@@ -292,14 +298,14 @@ def stereo_cameras(
     """
     number("stereo_cameras", "base", base, least=0.0)
     number("stereo_cameras", "lens_error", lens_error)
-    middle = Camera.looking(r, at, up=up)
+    middle = PlacedCamera.looking(r, at, up=up)
     aside = base / 2 * middle.R[:, 0]
     return _with_lens_error(
-        [Camera.looking(middle.r + s * aside, at, up=up) for s in (-1, 1)], lens_error, policy
+        [PlacedCamera.looking(middle.r + s * aside, at, up=up) for s in (-1, 1)], lens_error, policy
     )
 
 
-def _with_lens_error(believed: list[Camera], lens_error: float, policy: dict[str, Any]) -> Cameras:
+def _with_lens_error(believed: list[PlacedCamera], lens_error: float, policy: dict[str, Any]) -> Cameras:
     cameras = [
         replace(camera, distortion=sign * lens_error * np.eye(5)[0])
         for camera, sign in zip(believed, (1.0, -1.0), strict=False)

@@ -1,4 +1,4 @@
-"""The same motion explained by several models of a robot: `compare`, and those of Table 6.3."""
+"""The same motion explained by several models of a robot: `compare_models`, and those of Table 6.3."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -54,7 +54,7 @@ class ModelComparison(Record):
         return " ".join(cells)
 
 
-def compare(
+def compare_models(
     robot: Model | Dae,
     log: MotionLog | Sequence[MotionLog],
     models: Mapping[str, Mapping[str, Any]],
@@ -68,7 +68,7 @@ def compare(
     """
     if not models:
         raise ModelError(
-            "compare: found no models, expected keywords of identify by name; see printed_models"
+            "compare_models: found no models, expected keywords of identify by name; see printed_models"
         )
     dae = robot if isinstance(robot, Dae) else translate(robot)
     nominal = None if isinstance(robot, Dae) else robot

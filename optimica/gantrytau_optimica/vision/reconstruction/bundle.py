@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.reconstruction.spacing import Spacing

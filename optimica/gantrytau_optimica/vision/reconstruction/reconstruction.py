@@ -10,7 +10,7 @@ from gantrytau.border.checks import array
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector
 from gantrytau_optimica.calibration.data.measurements import Measurements
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.scenes.scene import AHEAD

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gantrytau.kinematics.rotations import best_rotation, mean_rotation
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import VisionError, opencv
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.vision.intrinsics import Camera
 from gantrytau_optimica.vision.opencv import opencv

@@ -12,7 +12,7 @@ from gantrytau import ModelError
 from gantrytau.border.checks import whole
 from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.vision.image_files import file_name, write_image, write_poses
 from gantrytau_optimica.vision.opencv import opencv
 from gantrytau_optimica.vision.scenes.drawing import Wall, bodies, draw, wall_of
@@ -47,16 +47,16 @@ def render(
     """Images of a scene at poses of the plate, by each camera.
 
     poses: positions (N, 3) in m, or (r, R) with orientations (N, 3, 3) or (3, 3); cameras: where they stand
-    (`Camera.looking`, `Camera.placed`); light: one for all, or one for each pose; seed: of noise and tilt: each image has
-    its own numbers, whatever other images there are. folder: write the images to folder/camera1/0000.png and so on and
-    the poses to folder/poses.csv; otherwise they are kept in memory, 0.8 MB each.
+    (`PlacedCamera.looking`, `PlacedCamera.placed`); light: one for all, or one for each pose; seed: of noise and tilt: each
+    image has its own numbers, whatever other images there are. folder: write the images to folder/camera1/0000.png and so
+    on and the poses to folder/poses.csv; otherwise they are kept in memory, 0.8 MB each.
     Raises ModelError for cameras that stand nowhere, lights that are not as many as the poses, and poses out of reach.
     """
     whole("render", "seed", seed, least=0)
     r, R = scene.poses(*poses) if isinstance(poses, tuple) else scene.poses(poses)
     if not cameras or not all(isinstance(camera, PlacedCamera) for camera in cameras):
         raise ModelError(
-            "expected cameras that stand somewhere; place them by Camera.looking(r, at) or Camera.placed(r, R)",
+            "expected cameras that stand somewhere; place them by PlacedCamera.looking(r, at) or PlacedCamera.placed(r, R)",
             place="render",
             found=Given("cameras", cameras),
         )

@@ -13,7 +13,7 @@ from gantrytau.describing.record import Record
 from gantrytau.kinematics import Kinematics
 from gantrytau.kinematics.poses import poses
 from gantrytau.kinematics.rods.rod_robots import ThreeRods
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.calibration.devices.devices import checked_rotation
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.vision.boards import Pattern

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gantrytau.kinematics.rotations import skewed, turned
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 
 Array = np.ndarray
 ROUNDS = 6

@@ -11,7 +11,7 @@ from gantrytau.border.checks import number
 from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import rotation_vector, turned
-from gantrytau_optimica.calibration.devices.cameras import Camera as PlacedCamera
+from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.vision.boards import Pattern
 from gantrytau_optimica.vision.detection.detections import homography
 from gantrytau_optimica.vision.detection.quincunx import find_quincunx, noise_of
@@ -54,10 +54,10 @@ class PatternTracker(Record):
         for left, right in images:
             here = tracker.update([left, right])
 
-    cameras: where they stand (`Reconstruction.cameras`, `Camera.looking`); period: between images, s; acceleration: standard
-    deviation of what a predictor of constant velocity does not expect, m/s2, and rad/s2 for turns; up: of the pattern in
-    the image, as of `detect`. Filtered by Kalman with the covariance of each pose. Raises ModelError for another pattern,
-    cameras that stand nowhere and images that are not as many.
+    cameras: where they stand (`Reconstruction.cameras`, `PlacedCamera.looking`); period: between images, s; acceleration:
+    standard deviation of what a predictor of constant velocity does not expect, m/s2, and rad/s2 for turns; up: of the
+    pattern in the image, as of `detect`. Filtered by Kalman with the covariance of each pose.
+    Raises ModelError for another pattern, cameras that stand nowhere and images that are not as many.
     """
 
     pattern: Pattern
@@ -83,7 +83,7 @@ class PatternTracker(Record):
         self.cameras = tuple(self.cameras)
         if not self.cameras or not all(isinstance(camera, PlacedCamera) for camera in self.cameras):
             raise ModelError(
-                "expected those of a Reconstruction, or Camera.looking(r, at)",
+                "expected those of a Reconstruction, or PlacedCamera.looking(r, at)",
                 place="PatternTracker",
                 found=Given("cameras", self.cameras),
             )

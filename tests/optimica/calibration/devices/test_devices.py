@@ -11,7 +11,12 @@ from scipy.optimize import least_squares
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import turned
 from gantrytau.kinematics.workspace.obstacles import Capsule
-from gantrytau_optimica.calibration.devices.cameras import Camera, Cameras, single_camera, stereo_cameras
+from gantrytau_optimica.calibration.devices.cameras import (
+    Cameras,
+    PlacedCamera,
+    single_camera,
+    stereo_cameras,
+)
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
 from gantrytau_optimica.calibration.devices.sight import Bars
@@ -149,7 +154,7 @@ def test_a_tmac_needs_more_distance_than_a_reflector():
 
 
 def test_a_pinhole_projects_by_similar_triangles():
-    camera = Camera(np.zeros(3), UPRIGHT, focal=1000.0, size=(801, 601))
+    camera = PlacedCamera(np.zeros(3), UPRIGHT, focal=1000.0, size=(801, 601))
     assert camera.project([[0.1, 0.2, 2.0]])[0] == pytest.approx([450.0, 400.0])
     assert np.isnan(camera.project([[0.1, 0.2, -2.0]])).all()
     assert camera.inside(np.array([[0.0, 0.0], [801.0, 10.0]])).tolist() == [True, False]
@@ -157,7 +162,7 @@ def test_a_pinhole_projects_by_similar_triangles():
 
 def test_slopes_of_images_against_differences():
     lens = (-0.2, 0.1, 2e-3, -3e-3, 0.05)
-    camera = Camera.looking([-2.0, 0.3, 0.4], [0.0, 0.0, 0.0], distortion=lens)
+    camera = PlacedCamera.looking([-2.0, 0.3, 0.4], [0.0, 0.0, 0.0], distortion=lens)
     points, step = cube(50, 0.4), 1e-6
     _, slopes = camera.slopes(points)
     for k in range(3):
@@ -169,7 +174,7 @@ def test_slopes_of_images_against_differences():
 
 
 def test_a_camera_looks_where_it_is_told_with_up_in_the_image_up():
-    camera = Camera.looking([-2.0, 0.0, 0.0], [0.0, 0.5, 0.3])
+    camera = PlacedCamera.looking([-2.0, 0.0, 0.0], [0.0, 0.5, 0.3])
     middle, above = camera.project([[0.0, 0.5, 0.3], [0.0, 0.5, 0.4]])
     assert middle == pytest.approx(camera.centre)
     assert above[1] < middle[1]
@@ -237,13 +242,13 @@ def test_what_cameras_see():
 
 def test_a_lens_does_not_fold_the_world_back_into_its_image():
     """Beyond the largest radius of its polynomial, x - 0.3 x3 at x = 1.05, the image would come back to the middle."""
-    camera = Camera(np.zeros(3), UPRIGHT, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
+    camera = PlacedCamera(np.zeros(3), UPRIGHT, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
     assert camera.border == pytest.approx(1 / 0.9)
     x = np.linspace(0.0, 3.0, 301)
     image = camera.project(np.column_stack([x, 0 * x, 0 * x + 1.0]))
     assert np.isnan(image[:, 0]).tolist() == (x > np.sqrt(1 / 0.9)).tolist()
     assert np.all(np.diff(image[: int(np.sum(x < 1.05)), 0]) > 0)
-    assert Camera(np.zeros(3), UPRIGHT).border == np.inf
+    assert PlacedCamera(np.zeros(3), UPRIGHT).border == np.inf
     device = replace(single_camera([-2.5, 0, 0], [0, 0, 0]), facing=None)
     beside = np.column_stack([np.full(400, -1.5), np.linspace(1.0, 10.0, 400), np.zeros(400)])
     assert not device.sees(beside, TO_CAMERA).any()  # 45 deg and more off the axis of a lens of 24
@@ -293,7 +298,7 @@ def test_a_gauge_reads_how_far_a_face_is_pushed():
 
 # arguments
 
-ONE = {"cameras": [Camera(np.zeros(3), np.eye(3))]}
+ONE = {"cameras": [PlacedCamera(np.zeros(3), np.eye(3))]}
 
 
 @pytest.mark.parametrize(
@@ -308,10 +313,10 @@ ONE = {"cameras": [Camera(np.zeros(3), np.eye(3))]}
         (LaserTracker, "obstacles", ball([0, 0, 0], 1.0)),
         (LengthGauge, "face", [0, 0, 0]),
         (LengthGauge, "stroke", (0.1, 0.0)),
-        (partial(Camera, np.zeros(3), np.eye(3)), "size", 3),
-        (partial(Camera, np.zeros(3), np.eye(3)), "focal", -5.0),
-        (partial(Camera, np.zeros(3), np.eye(3)), "distortion", [0.1]),
-        (partial(Camera.looking, np.zeros(3), [1, 0, 0]), "up", [1, 0, 0]),
+        (partial(PlacedCamera, np.zeros(3), np.eye(3)), "size", 3),
+        (partial(PlacedCamera, np.zeros(3), np.eye(3)), "focal", -5.0),
+        (partial(PlacedCamera, np.zeros(3), np.eye(3)), "distortion", [0.1]),
+        (partial(PlacedCamera.looking, np.zeros(3), [1, 0, 0]), "up", [1, 0, 0]),
         (Cameras, "cameras", [1]),
         (partial(Cameras, **ONE), "pattern", np.eye(3)),
         (partial(Cameras, **ONE), "pattern", np.outer(range(4), [1, 0, 0])),

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
-from gantrytau_optimica.identification import FURTHER_MODELS, TABLE_6_3, compare, printed_models
+from gantrytau_optimica.identification import FURTHER_MODELS, TABLE_6_3, compare_models, printed_models
 from tests.optimica.identification import gantry_logs as logs
 
 COULOMB = np.array([[189.12, 145.69], [262.59, 119.23], [239.06, 177.22]])  # N, Table 6.1
@@ -19,7 +19,7 @@ def test_the_models_of_the_thesis_rank_as_printed():
     One motion and 20 seeds of noise, of which three are run: noise moves a sum of squares by a thousandth, and none of the
     printed ones is closer than a tenth to the next.
     """
-    tables = [compare(logs.robot(), logs.log(seed, logs.REAL), MODELS) for seed in range(3)]
+    tables = [compare_models(logs.robot(), logs.log(seed, logs.REAL), MODELS) for seed in range(3)]
     totals = np.array([[table.totals[name] for name in ("2", "4", "1", "3")] for table in tables])
     scatter = np.max(np.std(totals, axis=0, ddof=1) / np.mean(totals, axis=0))
     gaps = np.diff(np.log(totals), axis=1)
@@ -28,13 +28,15 @@ def test_the_models_of_the_thesis_rank_as_printed():
 
 def test_other_motions_rank_so_too_but_for_old_friction_against_none():
     """Other motions of the same kind. Which of the two worst is worse depends on how fast one is: as printed in 17 of 20."""
-    found = [compare(logs.robot(), logs.log(k, logs.REAL, motion_seed=k), MODELS).ranking for k in range(20)]
+    found = [
+        compare_models(logs.robot(), logs.log(k, logs.REAL, motion_seed=k), MODELS).ranking for k in range(20)
+    ]
     assert all(ranking[:2] == ("2", "4") for ranking in found)
     assert found.count(("2", "4", "1", "3")) >= 15
 
 
 def test_the_table_stands_beside_the_printed_one():
-    table = compare(
+    table = compare_models(
         GantryTau(prototypes.L1), logs.log(0, logs.REAL), MODELS | FURTHER_MODELS, beside=TABLE_6_3
     )
     text = str(table)
@@ -55,4 +57,4 @@ def test_the_table_stands_beside_the_printed_one():
 
 def test_no_models_are_refused():
     with pytest.raises(ModelError, match="found no models, expected keywords of identify by name"):
-        compare(GantryTau(prototypes.L1), logs.log(0), {})
+        compare_models(GantryTau(prototypes.L1), logs.log(0), {})

@@ -117,8 +117,8 @@ def test_a_pattern_from_behind_or_behind_the_camera_is_not_seen():
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: render(scene(), MIDDLE, [LENS]), "place them by Camera.looking"),  # pyright: ignore[reportArgumentType]
-        (lambda: render(scene(), MIDDLE, []), "place them by Camera.looking"),
+        (lambda: render(scene(), MIDDLE, [LENS]), "place them by PlacedCamera.looking"),  # pyright: ignore[reportArgumentType]
+        (lambda: render(scene(), MIDDLE, []), "place them by PlacedCamera.looking"),
         (lambda: render(scene(), MIDDLE, pair(), light=[Light()] * 2), "found 2 lights for 1 poses"),
         (lambda: render(scene(), [9.0, 9.0, 9.0], pair()), "does not reach 1 of 1 poses"),
         (lambda: render(scene(), [np.nan, 3.0, -0.6], pair()), "not finite"),
