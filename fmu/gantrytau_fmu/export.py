@@ -81,7 +81,7 @@ def export_fmu(
     raises. FMI 2.0.4 and 3.0.2.
     """
     check_words(export_fmu, {"fmi": fmi, "solver": solver})
-    number("export_fmu", "tolerance", tolerance, least=1e-12, below=1.0)
+    tolerance = number("export_fmu", "tolerance", tolerance, least=1e-12, below=1.0)
     kinds = _interfaces(interfaces)
     about: Build = instance("export_fmu", "build", Build() if build is None else build, Build)
     check_target(path)

@@ -5,28 +5,38 @@ Each check takes the place that its message names, the argument and what was fou
 
 import inspect
 import math
+import operator
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
-from numbers import Real
+from numbers import Number
 from typing import Any, Literal, get_args, get_origin
 
+import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import GantryTauError, Given, ModelError, did_you_mean
 from gantrytau.border.units import given
 
 Shape = tuple[int | None, ...]
+BOOLS = (bool, np.bool_)
 
 
 def one_of(place: str, argument: str, found: Any, words: Iterable[Any]) -> Any:
     """A word of those allowed; ModelError with all of them for anything else."""
     words = tuple(words)
-    if any(type(found) is type(word) and found == word for word in words):
-        return found
+    for word in words:
+        if _same(found, word):
+            return word
     names = [word for word in words if isinstance(word, str)]
     meant = did_you_mean(found, names) if isinstance(found, str) else ""
     guess = meant if "did you mean" in meant else ""
     raise _refused(place, argument, found, f"{either([repr(word) for word in words])}{guess}")
+
+
+def _same(found: Any, word: Any) -> bool:
+    """Whether a value, one of NumPy too, is a word: True is not 1."""
+    kinds: Any = {bool: BOOLS, int: (int, np.integer)}.get(type(word), type(word))
+    return isinstance(found, kinds) and isinstance(found, BOOLS) == isinstance(word, bool) and found == word
 
 
 def check_words(function: Callable[..., Any], values: Mapping[str, Any], place: str | None = None) -> None:
@@ -64,21 +74,29 @@ def number(
     most: float | None = None,
     below: float | None = None,
 ) -> float:
-    """A finite number within its limits, in SI; a text brings its unit, as "700 mm". ModelError for anything else."""
-    value = _number(place, argument, found, unit)
+    """A number within its limits, in SI; a text brings its unit, as "700 mm". ModelError for anything else.
+
+    It is finite, unless `most` or `least` is infinite: there infinity stands for no limit.
+    """
+    limits = _limits(least, above, most, below)
+    value = _number(place, argument, found, unit, limits)
     small = (least is not None and value < least) or (above is not None and value <= above)
     large = (most is not None and value > most) or (below is not None and value >= below)
-    if not math.isfinite(value) or small or large:
-        raise _refused(place, argument, found, f"a number{_limits(least, above, most, below)}{_in(unit)}")
+    if small or large or not (math.isfinite(value) or value in (least, most)):
+        kind = "a finite number" if math.isinf(value) else "a number"
+        raise _refused(place, argument, found, f"{kind}{limits}{_in(unit)}")
     return value
 
 
 def whole(place: str, argument: str, found: Any, *, least: int | None = None, most: int | None = None) -> int:
     """A whole number within its limits; ModelError for anything else, 2.0 and True too."""
-    fits = isinstance(found, (int, np.integer)) and not isinstance(found, bool)
-    if not fits or (least is not None and found < least) or (most is not None and found > most):
+    try:
+        value = None if isinstance(found, BOOLS) else operator.index(found)
+    except TypeError:
+        value = None
+    if value is None or (least is not None and value < least) or (most is not None and value > most):
         raise _refused(place, argument, found, f"a whole number{_limits(least, None, most, None)}")
-    return int(found)
+    return value
 
 
 def array(
@@ -93,20 +111,25 @@ def array(
 ) -> np.ndarray:
     """An array of numbers in SI of one of the shapes, None for any length; texts bring their unit.
 
+    A column of CasADi's DM is a vector where one is expected.
     ModelError for another shape, for what is no number or beyond its limit, and unless `finite` is False for nan and
     infinity.
     """
     limits = _limits(least, above, None, None)
-    wanted = f"numbers{limits}{_in(unit)}{_shaped(shapes)}"
+    wanted = f"{numbers_of(*shapes)}{limits}{_in(unit)}"
     try:
         values = np.asarray(_si(place, argument, found, unit) if unit else found)
         if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and _numeric(values)):
             raise TypeError
         values = values.astype(float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise _refused(place, argument, found, wanted) from None
-    if shapes and not any(_fits(values.shape, shape) for shape in shapes):
-        size = " x ".join(map(str, values.shape)) or "a single number"
+    if isinstance(found, ca.DM) and found.is_column() and not _fits(values.shape, *shapes):
+        values = values.ravel()
+    if not values.shape and not _fits((), *shapes):
+        raise _refused(place, argument, found, wanted)
+    if not _fits(values.shape, *shapes):
+        size = f"{len(values)} numbers" if values.ndim == 1 else " x ".join(map(str, values.shape))
         raise ModelError(f"found {argument} of {size}, expected {wanted}", place=place, argument=argument)
     wrong = ~np.isfinite(values) if finite else np.zeros(values.shape, dtype=bool)
     if least is not None:
@@ -124,7 +147,7 @@ def array(
 def _numeric(values: np.ndarray) -> bool:
     """Whether an array of objects holds numbers alone: a symbol of CasADi makes a float too, nan."""
     kinds = {type(value) for value in values.flat}
-    return bool(kinds) and all(issubclass(kind, Real) and kind is not bool for kind in kinds)
+    return all(issubclass(kind, Number) and kind is not bool for kind in kinds)
 
 
 def instance(place: str, argument: str, found: Any, kinds: Any, expected: str | None = None) -> Any:
@@ -144,15 +167,16 @@ def _refused(place: str, argument: str, found: Any, expected: str) -> GantryTauE
     return ModelError(f"expected {expected}", place=place, found=Given(argument, found))
 
 
-def _number(place: str, argument: str, found: Any, unit: str | None) -> float:
+def _number(place: str, argument: str, found: Any, unit: str | None, limits: str) -> float:
     try:
         if isinstance(found, str) and unit:
             return float(_si(place, argument, found, unit))
-        if isinstance(found, (bool, str, bytes)) or (isinstance(found, np.ndarray) and found.ndim):
+        kind = getattr(getattr(found, "dtype", None), "kind", "")  # of an array, and of a number of NumPy
+        if isinstance(found, (bool, str, bytes)) or (kind and (kind not in "iuf" or found.ndim)):
             raise TypeError
         return float(found)
-    except (TypeError, ValueError, RuntimeError):  # of CasADi: a symbol
-        raise _refused(place, argument, found, f"a number{_in(unit)}") from None
+    except (TypeError, ValueError, OverflowError, RuntimeError):  # the last of CasADi: a symbol
+        raise _refused(place, argument, found, f"a number{limits}{_in(unit)}") from None
 
 
 def _si(place: str, argument: str, found: Any, unit: str) -> Any:
@@ -166,9 +190,9 @@ def _si(place: str, argument: str, found: Any, unit: str) -> Any:
 def _limits(least: float | None, above: float | None, most: float | None, below: float | None) -> str:
     """Limits in words, with a space before them."""
     sides = [
-        *([f"of at least {least:g}"] if least is not None else ()),
+        *([f"of at least {least:g}"] if least not in (None, -math.inf) else ()),
         *([f"above {above:g}"] if above is not None else ()),
-        *([f"of at most {most:g}"] if most is not None else ()),
+        *([f"of at most {most:g}"] if most not in (None, math.inf) else ()),
         *([f"below {below:g}"] if below is not None else ()),
     ]
     return f" {' and '.join(sides)}" if sides else ""
@@ -178,11 +202,19 @@ def _in(unit: str | None) -> str:
     return f" in {unit}" if unit and unit != "1" else ""
 
 
-def _shaped(shapes: tuple[Shape, ...]) -> str:
-    """Shapes in words: `of 3` or `of n x 3`."""
-    sizes = [" x ".join("n" if n is None else str(n) for n in shape) for shape in shapes]
-    return f", {either(sizes)}" if sizes and all(sizes) else ""
+def numbers_of(*shapes: Shape) -> str:
+    """Shapes in words: `3 numbers or n x 3 numbers`."""
+    words = []
+    for shape in shapes:
+        letters = iter("nmkl")
+        size = " x ".join(next(letters) if n is None else str(n) for n in shape)
+        known = {(): "a number", (1,): "1 number", (None,): "a list of numbers"}
+        words.append(known.get(shape, f"{size} numbers"))
+    return either(words) or "numbers"
 
 
-def _fits(found: Shape, wanted: Shape) -> bool:
-    return len(found) == len(wanted) and all(n in (None, m) for m, n in zip(found, wanted, strict=True))
+def _fits(found: Shape, *shapes: Shape) -> bool:
+    return not shapes or any(
+        len(found) == len(one) and all(n in (None, m) for m, n in zip(found, one, strict=True))
+        for one in shapes
+    )

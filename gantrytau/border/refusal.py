@@ -114,8 +114,9 @@ class DoubtfulResult(UserWarning):
 
 
 def short(value: Any) -> str:
-    """A value as Python writes it, cut where it is long."""
-    text = repr(value.tolist() if hasattr(value, "tolist") else value)
+    """A value as Python writes it, in one line, cut where it is long; of an object without a text its class."""
+    text = " ".join(repr(value.tolist() if hasattr(value, "tolist") else value).split())
+    text = re.sub(r"<(?:[\w<>]+\.)*([\w<>]+) (?:object )?at 0x[0-9a-fA-F]+>", r"<\1>", text)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 

@@ -42,8 +42,9 @@ class Samples:
 
     def __post_init__(self):
         one_of("Samples", "kind", self.kind, KINDS)
-        if self.largest_gap is not None and self.largest_gap != np.inf:
-            number("Samples", "largest_gap", self.largest_gap, above=0.0)
+        if self.largest_gap is not None:
+            gap = number("Samples", "largest_gap", self.largest_gap, above=0.0, most=np.inf)
+            object.__setattr__(self, "largest_gap", gap)
         times, values = (array("Samples", n, getattr(self, n), finite=False) for n in ("times", "values"))
         if values.ndim == 1:
             values = values[:, None]

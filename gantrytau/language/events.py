@@ -254,5 +254,5 @@ def transition(
     values just before.
     """
     if priority is not None:
-        number("transition", "priority", priority)
+        priority = number("transition", "priority", priority)
     return Transition(mode, source, target, guard, actions, priority, period)

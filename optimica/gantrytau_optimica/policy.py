@@ -1,5 +1,6 @@
 """How a problem is to be solved: the keywords of `optimize` as one record, checked when it is made."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -67,13 +68,16 @@ class Policy:
 
     def __post_init__(self):
         check_words(Policy, vars(self), "")
-        number("", "tolerance", self.tolerance, above=0.0, below=1.0)
-        number("", "max_time", self.max_time, above=0.0)
+        limits: dict[str, dict[str, Any]] = {
+            "tolerance": {"above": 0.0, "below": 1.0},
+            "max_time": {"above": 0.0, "most": math.inf},
+        }
+        limits |= {} if self.refine is None else {"refine": {"least": 1e-9, "below": 1.0}}
+        for name, these in limits.items():
+            object.__setattr__(self, name, number("", name, getattr(self, name), **these))
         for name in ("max_iterations", "starts"):
             whole("", name, getattr(self, name), least=1)
         whole("", "points", self.points, least=METHODS[self.scheme].least, most=MOST_POINTS)
-        if self.refine is not None:
-            number("", "refine", self.refine, least=1e-9, below=1.0)
         if self.progress is not None:
             instance("", "progress", self.progress, Callable, "a function of (iteration, objective)")
         scheme = Given("scheme", self.scheme)

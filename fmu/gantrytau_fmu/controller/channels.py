@@ -36,7 +36,7 @@ class Channel:
         whole(place, "size", self.size, least=1)
         for side, value in (("minimum", self.minimum), ("maximum", self.maximum)):
             if value is not None:
-                number(place, side, value)
+                object.__setattr__(self, side, number(place, side, value, least=-np.inf, most=np.inf))
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
             expected = f"expected it below the maximum, {self.maximum:g}"
             raise ModelError(expected, place=place, found=Given("minimum", self.minimum))

@@ -46,7 +46,7 @@ def check_fmu(
     run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
     no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
     """
-    number("check_fmu", "timeout", timeout, above=0.0, unit="s")
+    timeout = number("check_fmu", "timeout", timeout, above=0.0, unit="s")
     path = Path(path)
     return [replace(finding, path=str(path)) for finding in errors_first(_found(path, run, timeout))]
 

@@ -61,7 +61,8 @@ class Master(Record):
         whole("Master", "iterations", self.iterations, least=1)
         if self.tolerance is not None:
             number("Master", "tolerance", self.tolerance, above=0.0, below=1.0)
-        number("Master", "timeout", self.timeout, above=0.0, unit="s")
+        timeout = number("Master", "timeout", self.timeout, above=0.0, unit="s")
+        object.__setattr__(self, "timeout", timeout)
 
     def isolated(self, components: Collection[str]) -> tuple[str, ...]:
         """The components that run in processes of their own."""

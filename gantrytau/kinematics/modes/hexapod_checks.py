@@ -17,7 +17,7 @@ _PATH = "assembly_modes"
 
 def checked_hexapod(base: Any, platform: Any, lengths: Any, diameter: float) -> tuple[np.ndarray, ...]:
     """Joints and lengths as arrays of floats. Raises ModelError and StructureError as `assembly_modes` says."""
-    number(_PATH, "diameter", diameter, unit="m", least=0.0)
+    diameter = number(_PATH, "diameter", diameter, unit="m", least=0.0)
     base = array(_PATH, "base", base, (6, 3), unit="m")
     platform = array(_PATH, "platform", platform, (6, 3), unit="m")
     lengths = array(_PATH, "lengths", lengths, (6,), unit="m", above=0.0)

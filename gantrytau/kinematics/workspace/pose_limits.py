@@ -63,8 +63,10 @@ class Limits(Record):
         self._in_si(("link_radius", "stroke_margin", "clearance"), unit="m", least=0.0)
         self._in_si(("turn_margin", "angle_margin"), unit="rad", least=0.0)
         self._in_si(("lever",), unit="m", above=0.0)
-        self._in_si(("ball_joint",), unit="rad", above=0.0, most=math.pi)
-        self._in_si(("condition",), above=1.0)
+        self._in_si(("ball_joint",), unit="rad", above=0.0, most=math.inf)
+        if self.ball_joint != math.inf:
+            self._in_si(("ball_joint",), unit="rad", above=0.0, most=math.pi)
+        self._in_si(("condition",), above=1.0, most=math.inf)
         for name in ("obstacles", "plate"):
             bodies = getattr(self, name)
             bodies = tuple(bodies) if isinstance(bodies, (list, tuple)) else (bodies,)
@@ -76,10 +78,9 @@ class Limits(Record):
             instance("Limits", "plate", body, Capsule, "Capsule in plate axes")
 
     def _in_si(self, names: Iterable[str], **limits: Any) -> None:
-        """Numbers in SI, those that limit nothing as they are."""
+        """Numbers in SI."""
         for name in names:
-            if (found := getattr(self, name)) != math.inf:
-                object.__setattr__(self, name, number("Limits", name, found, **limits))
+            object.__setattr__(self, name, number("Limits", name, getattr(self, name), **limits))
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,8 +119,8 @@ def cart_servos(
     bandwidth: rad/s, of the loop of the speed, for each cart with its share of the tool: m_c + m_p |dr/dq_i|^2.
     Raises ModelError where the links do not reach r, and for poles that are not between 0 and 1.
     """
-    number("cart_servos", "bandwidth", bandwidth, unit="rad/s", above=0.0)
-    number("cart_servos", "period", period, unit="s", above=0.0)
+    bandwidth = number("cart_servos", "bandwidth", bandwidth, unit="rad/s", above=0.0)
+    period = number("cart_servos", "period", period, unit="s", above=0.0)
     whole("cart_servos", "delay", delay, least=0)
     if len(poles) != len(prototype.arms) or not all(0 < a < 1 for a in poles):
         raise ModelError(

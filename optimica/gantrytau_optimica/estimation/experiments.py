@@ -42,7 +42,8 @@ class Experiment(Record):
     def __post_init__(self):
         for which in ("begin", "stop"):
             if getattr(self, which) is not None:
-                number("Experiment", which, getattr(self, which), unit="s")
+                value = number("Experiment", which, getattr(self, which), unit="s")
+                object.__setattr__(self, which, value)
         for which in ("measured", "inputs", "start", "parameters", "guess"):
             instance("Experiment", which, getattr(self, which), Mapping, "{name: ...}")
         if not self.measured:

@@ -167,7 +167,7 @@ class ParameterFit(Record):
         """
         from scipy import stats
 
-        number("intervals", "confidence", confidence, above=0.0, below=1.0)
+        confidence = number("intervals", "confidence", confidence, above=0.0, below=1.0)
         wide = stats.norm if self.known and self.loss == "squares" else stats.t(self.freedom)
         half = float(wide.ppf((1 + confidence) / 2))
         return {

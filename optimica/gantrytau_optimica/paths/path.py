@@ -203,7 +203,7 @@ class Path(Record):
         name = "Path.recorded"
         found = checked_points(name, points, FEWEST, "; Path.through takes few")
         if tolerance is not None:
-            number(name, "tolerance", tolerance, unit="m", above=0.0)
+            tolerance = number(name, "tolerance", tolerance, unit="m", above=0.0)
         if np.ptp(found, axis=0).max() == 0.0:
             raise ModelError(f"{name}: all {len(found)} points are the same, expected a way; record a motion")
         made = smoothed(found, tolerance, ACCURACY, name)

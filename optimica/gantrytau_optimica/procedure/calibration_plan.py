@@ -55,8 +55,8 @@ class CalibrationPlan(PosePlan):
                 f"motion: found a plan of {self.robot_name} that was loaded without it, expected its robot; "
                 "load_plan(folder, robot, limits)"
             )
-        number("motion", "speed", speed, least=1e-3)
-        number("motion", "rest", rest, least=0.0)
+        speed = number("motion", "speed", speed, least=1e-3)
+        rest = number("motion", "rest", rest, least=0.0)
         fleet = self.cell.fleet.with_limits(self.cell.limits)
         return plan_motion(fleet.robot, fleet.nominal, self.q, self.measured, speed, rest)
 

@@ -88,7 +88,7 @@ def rehearse_plan(
     the plan. Raises ModelError for a plan for another device, and all errors of its steps.
     """
     check_words(rehearse_plan, locals())
-    number("rehearse_plan", "side", side, above=0.0)
+    side = number("rehearse_plan", "side", side, above=0.0)
     whole("rehearse_plan", "seed", seed, least=0)
     device = _cameras_of(planned)
     tell = progress or (lambda words: None)

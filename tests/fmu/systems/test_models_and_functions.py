@@ -88,7 +88,7 @@ REFUSED = [
     (lambda t, v: {"v": 1.0}, "law: the function <lambda> answered ['v'], expected {name: value} of u"),
     (lambda t, v: 3.0, "law: the function <lambda> answered 3.0, expected {name: value} of u"),
     (lambda t, v: {"u": [1.0, 2.0]}, "law: the function <lambda> answered u = [1.0, 2.0], expected"),
-    (lambda t, v: {"u": "fast"}, "law: the function <lambda> answered u = 'fast', expected numbers, 1"),
+    (lambda t, v: {"u": "fast"}, "law: the function <lambda> answered u = 'fast', expected 1 number"),
     (lambda t, v: {"u": 1 / 0}, "law: the function <lambda> raised ZeroDivisionError: division by zero;"),
     (lambda t, v: {"u": math.nan}, "law: found law.u = nan at t = 0.1 s, expected finite values"),
 ]

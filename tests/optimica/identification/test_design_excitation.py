@@ -128,7 +128,7 @@ def test_it_is_saved_as_csv_and_as_a_program(tmp_path):
         (dict(parameters=[]), "found parameters=\\[\\], expected names"),
         (dict(limits=dict(speed=1.0)), "found limits \\['speed'\\], expected dict"),
         (dict(limits=LIMITS | dict(force=-1.0)), "found limit force=-1.0, expected a number above 0 or 3"),
-        (dict(limits=LIMITS | dict(box=([1, 2], [3, 4]))), "found limits of 2 x 2, expected numbers, 2 x 3"),
+        (dict(limits=LIMITS | dict(box=([1, 2], [3, 4]))), "found limits of 2 x 2, expected 2 x 3 numbers"),
         (dict(harmonics=1), "found harmonics=1"),
         (dict(duration=0.0), "found duration=0.0"),
     ],

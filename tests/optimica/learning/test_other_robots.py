@@ -146,7 +146,7 @@ def test_axes_that_are_not_there_cannot_move():
 
 
 def test_servos_and_references_that_do_not_fit_are_told():
-    with pytest.raises(ModelError, match="found position of 9 x 2, expected numbers, n x 3"):
+    with pytest.raises(ModelError, match="found position of 9 x 2, expected n x 3 numbers"):
         Rig(DeltaRobot(), [JointServo() for _ in range(3)], period=PERIOD).run(np.zeros((9, 2)))
     with pytest.raises(ModelError, match="found 2 controllers, expected one for each joint"):
         Rig(DeltaRobot(), [JointServo(), JointServo()], period=PERIOD)

@@ -45,9 +45,9 @@ def run_client(
     ModelError where nobody is there, and where the controller refuses this client, in its words.
     """
     check_words(run_client, {"transport": transport})
-    number("run_client", "patience", patience, above=0.0, unit="s")
+    patience = number("run_client", "patience", patience, above=0.0, unit="s")
     if duration is not None:
-        number("run_client", "duration", duration, least=0.0, unit="s")
+        duration = number("run_client", "duration", duration, least=0.0, unit="s")
     if not (isinstance(address, Sequence) and len(address) == 2 and isinstance(address[1], int)):
         expected = "expected (host, port), as ('127.0.0.1', 5000)"
         raise ModelError(expected, place="run_client", found=Given("address", address))

@@ -166,7 +166,7 @@ class Server:
                 raise ModelError(
                     f"wait: there is no place for '{name}', expected one of {', '.join(self.places) or 'none'}"
                 )
-        number("wait", "timeout", timeout, least=0.0, unit="s")
+        timeout = number("wait", "timeout", timeout, least=0.0, unit="s", most=np.inf)
         pause, end = threading.Event(), time.monotonic() + timeout
         while missing := [name for name in wanted if not self.places[name].connected]:
             if time.monotonic() > end:

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from gantrytau.border.checks import numbers_of
 from gantrytau.border.dimensions import dimension
 from gantrytau.border.refusal import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau_fmu.controller.board import Board
@@ -88,7 +89,9 @@ class FunctionLaw:
                 wanted[place] = numbers.reshape(place.stop - place.start)
             except (TypeError, ValueError):
                 count = place.stop - place.start
-                raise self._failure(f"answered {name} = {value!r}, expected numbers, {count}", time) from None
+                raise self._failure(
+                    f"answered {name} = {value!r}, expected {numbers_of((count,))}", time
+                ) from None
         return wanted
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gantrytau.border.checks import numbers_of
 from gantrytau.border.refusal import USERS_ERRORS, ModelError, SolveError, did_you_mean, in_words
 from gantrytau_fmu.systems.component import Component, Scalar
 
@@ -184,7 +185,9 @@ class RunningFunction:
             except (TypeError, ValueError):
                 numbers = np.empty(0)
             if numbers.size != outputs[name].size:
-                raise self._failure(f"answered {name} = {value!r}, expected numbers, {outputs[name].size}")
+                raise self._failure(
+                    f"answered {name} = {value!r}, expected {numbers_of((outputs[name].size,))}"
+                )
             self.values.update(zip(outputs[name].elements, numbers.tolist(), strict=True))
 
     def _failure(self, words: str) -> SolveError:

@@ -109,7 +109,7 @@ def check_system(
 
     run: also try each FMU, as `check_fmu` does. `FmuFinding.path` names the file in the archive.
     """
-    number("check_system", "timeout", timeout, above=0.0, unit="s")
+    timeout = number("check_system", "timeout", timeout, above=0.0, unit="s")
     with tempfile.TemporaryDirectory(prefix="ssp-", ignore_cleanup_errors=True) as folder:
         return errors_first(_found(Path(path), Path(folder), run, timeout))
 

@@ -47,7 +47,7 @@ def plot_oscillation(
     """
     from matplotlib.figure import Figure
 
-    number("plot_oscillation", "begin", begin, unit="s")
+    begin = number("plot_oscillation", "begin", begin, unit="s")
     _refuse_none(runs, "plot_oscillation")
     figure = Figure(figsize=(9, 4), layout="constrained")
     force, spectrum = figure.subplots(1, 2)

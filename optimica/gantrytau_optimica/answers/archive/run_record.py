@@ -44,7 +44,7 @@ def run_record(
     that JSON lacks are the words "inf", "-inf" and "nan".
     """
     if read_time is not None:
-        number("run_record", "read_time", read_time, least=0.0)
+        read_time = number("run_record", "read_time", read_time, least=0.0)
     expected = "what optimize returned or its SolveError has as .optimum"
     instance("run_record", "optimum", optimum, Optimum, expected)
     program = optimum.program

@@ -58,8 +58,8 @@ def judge(
     the error of the tool where it is to work, by default at the poses that were fitted; tape: standard deviation of
     nominal values, m. Raises ModelError for models that no robot can hold, where `expected` is not given.
     """
-    number("judge", "tape", tape, above=0.0)
-    number("judge", "wanted", wanted, above=0.0)
+    tape = number("judge", "tape", tape, above=0.0)
+    wanted = number("judge", "wanted", wanted, above=0.0)
     checked = found if isinstance(found, CrossValidation) else held_out(found)
     fit = checked.calibration
     named = isinstance(fit, NamedCalibration)
@@ -132,7 +132,7 @@ def told_by_tool(
     expected: by default at the poses that were fitted; least: m, by which the tool must move to be worth a word, by default
     the noise; tape: deviation of nominal values, m.
     """
-    number("told_by_tool", "tape", tape, above=0.0)
+    tape = number("told_by_tool", "tape", tape, above=0.0)
     least = None if least is None else number("told_by_tool", "least", least, least=0.0)
     if isinstance(found, NamedCalibration):  # its words are those of the numbers already
         return found

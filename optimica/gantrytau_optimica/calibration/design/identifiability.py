@@ -176,9 +176,9 @@ def finite_poses(measurements: Any) -> tuple[PoseArrays, np.ndarray]:
 
 def check_deviations(place: str, noise: float, angle: float, tape: float) -> None:
     """ModelError for standard deviations of measurement and tape that are not above zero, or of angles below it."""
-    number(place, "noise", noise, above=0.0)
-    number(place, "angle", angle, least=0.0)
-    number(place, "tape", tape, above=0.0)
+    noise = number(place, "noise", noise, above=0.0)
+    angle = number(place, "angle", angle, least=0.0)
+    tape = number(place, "tape", tape, above=0.0)
 
 
 def _of_arm(

@@ -150,7 +150,7 @@ def enough_poses(
     """
     whole("enough_poses", "seed", seed, least=0)
     check_deviations("enough_poses", noise, angle, tape)
-    number("enough_poses", "error", error, above=0.0)
+    error = number("enough_poses", "error", error, above=0.0)
     arms, poses, finite = _candidates(robot, measurements, "local")
     blocks, weights = _blocks(arms, poses)
     gains = _gains(arms, poses)

@@ -73,7 +73,7 @@ class PoseSensitivities(Record):
 
     def summed(self, step: float = STEP) -> tuple[np.ndarray, np.ndarray]:
         """What (5.8) sums over poses and both signs of a step, to first order: (p,) in m, and (p,) in rad."""
-        number("summed", "step", step, above=0.0)
+        step = number("summed", "step", step, above=0.0)
         return 2 * step * np.nansum(self.sizes, axis=0), 2 * step * np.nansum(self.turns, axis=0)
 
     def spread(self, deviations: float | Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:

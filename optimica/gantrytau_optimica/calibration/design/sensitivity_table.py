@@ -70,7 +70,7 @@ def sensitivity_table(
     cannot be closed.
     """
     check_words(sensitivity_table, locals())
-    number("sensitivity_table", "step", step, above=0.0)
+    step = number("sensitivity_table", "step", step, above=0.0)
     arms, (poses, _) = read_arms(robot, orientation), finite_poses(measurements)
     q, r, R = [checked_poses(arm, *poses) for arm in arms][-1]
     here = PoseArrays(q, *poses_of(arms, q, r, R))

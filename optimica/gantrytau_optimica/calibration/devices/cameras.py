@@ -282,7 +282,7 @@ def single_camera(r: Any, at: Any, *, up: Any = UP, lens_error: float = LENS_ERR
     up: the direction of the upper edge of its image; lens_error: what is left of k1 after the camera was calibrated (see
     `stereo_cameras`); policy: as of Cameras.
     """
-    number("single_camera", "lens_error", lens_error)
+    lens_error = number("single_camera", "lens_error", lens_error)
     return _with_lens_error([PlacedCamera.looking(r, at, up=up)], lens_error, policy)
 
 
@@ -296,8 +296,8 @@ def stereo_cameras(
     2.5 m, which thesis section 5.5 found of its two cameras against a laser tracker (fitted: lenses are not printed).
     policy: as of Cameras.
     """
-    number("stereo_cameras", "base", base, least=0.0)
-    number("stereo_cameras", "lens_error", lens_error)
+    base = number("stereo_cameras", "base", base, least=0.0)
+    lens_error = number("stereo_cameras", "lens_error", lens_error)
     middle = PlacedCamera.looking(r, at, up=up)
     aside = base / 2 * middle.R[:, 0]
     return _with_lens_error(

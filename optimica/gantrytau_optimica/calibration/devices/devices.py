@@ -128,10 +128,10 @@ class Device(Record):
         cosine = np.einsum("nk,nk->n", R @ self.facing, back) / np.linalg.norm(back, axis=1)
         return np.arccos(np.clip(cosine, -1.0, 1.0))
 
-    def _numbers(self, *names: str, least: float | None = None, above: float | None = None) -> None:
-        """ModelError for arguments that are no finite numbers within limits."""
+    def _numbers(self, *names: str, **limits: Any) -> None:
+        """Arguments as numbers; ModelError for those that are none within limits."""
         for name in names:
-            number(type(self).__name__, name, getattr(self, name), least=least, above=above)
+            object.__setattr__(self, name, number(type(self).__name__, name, getattr(self, name), **limits))
 
     def _vector(self, name: str) -> Array:
         found = array(type(self).__name__, name, getattr(self, name), (3,))
@@ -185,7 +185,7 @@ class LaserTracker(Device):
         self._numbers("range_noise", "range_noise_per_metre", "transverse_noise", least=0.0)
         self._numbers("transverse_noise_per_metre", "nearest", "acceptance", least=0.0)
         self._numbers("scale")
-        self._numbers("farthest", above=self.nearest)
+        self._numbers("farthest", above=self.nearest, most=np.inf)
         self._range("elevation")
         super().__post_init__()
 

@@ -25,7 +25,7 @@ def instants(result: Result, rate: float) -> Array:
     A rate that does not divide the duration leaves an unread rest. ModelError for a rate that is not above zero, and for
     a result whose outputs lie farther apart than two readings: straight lines between them are not what moved.
     """
-    number("measure", "rate", rate, above=0.0)
+    rate = number("measure", "rate", rate, above=0.0)
     first, last = result.time[[0, -1]]
     apart = float(np.max(np.diff(result.time), initial=0.0))
     if apart * rate > 1 + EVEN:

@@ -117,9 +117,9 @@ def _best(
 
 
 def _check_numbers(duration: float, period: float | None, **counts: int) -> None:
-    number("design_excitation", "duration", duration, above=PERIOD)
+    duration = number("design_excitation", "duration", duration, above=PERIOD)
     if period is not None:
-        number("design_excitation", "period", period, above=PERIOD)
+        period = number("design_excitation", "period", period, above=PERIOD)
     least = dict(harmonics=2, starts=1, seed=0)
     for name, value in counts.items():
         whole("design_excitation", name, value, least=least[name])

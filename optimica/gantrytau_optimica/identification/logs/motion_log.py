@@ -83,7 +83,7 @@ class MotionLog(Record):
         that of `tool.r` if there is one, without noise. Raises ModelError for a robot without driven coordinates, for a
         period that is not above 0, and for a result with outputs farther apart than that.
         """
-        number("MotionLog.of", "period", period, above=0.0)
+        period = number("MotionLog.of", "period", period, above=0.0)
         for name, value in dict(encoder=encoder, force=force).items():
             number("MotionLog.of", name, value, least=0.0)
         whole("MotionLog.of", "seed", seed, least=0)

@@ -111,8 +111,8 @@ def identify(
 
 def _check_policy(friction: Any, holdout: Any, cutoff: float, minimum_speed: float) -> None:
     check_words(identify, dict(friction=friction, holdout=holdout))
-    number("identify", "cutoff", cutoff, above=0.0)
-    number("identify", "minimum_speed", minimum_speed, least=0.0)
+    cutoff = number("identify", "cutoff", cutoff, above=0.0)
+    minimum_speed = number("identify", "minimum_speed", minimum_speed, least=0.0)
 
 
 def _noticed(

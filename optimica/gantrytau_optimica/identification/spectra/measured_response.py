@@ -50,7 +50,7 @@ def measured_response(u: ArrayLike, y: ArrayLike, *, period: float, blocks: int 
     """
     place = "measured_response"
     whole(place, "blocks", blocks, least=2)
-    number(place, "period", period, unit="s", above=0)
+    period = number(place, "period", period, unit="s", above=0)
     u, y = sampled_motion(place, u, y, least=SHORTEST * blocks)
     inputs = u.shape[1]
     if blocks < 2 * inputs:

@@ -25,8 +25,8 @@ def resonances(
     """
     from scipy.signal import find_peaks
 
-    number("resonances", "period", period, unit="s", above=0)
-    number("resonances", "share", share, above=0.0, below=1.0)
+    period = number("resonances", "period", period, unit="s", above=0)
+    share = number("resonances", "share", share, above=0.0, below=1.0)
     y = np.asarray(y, dtype=float)
     columns = y[:, None] if y.ndim == 1 else y
     if columns.ndim != 2 or len(columns) < LEAST or not np.all(np.isfinite(columns)):

@@ -107,7 +107,7 @@ def identify_system(
     """
     whole("identify_system", "block_rows", block_rows, least=2)
     whole("identify_system", "order", order, least=1)
-    number("identify_system", "period", period, unit="s", above=0)
+    period = number("identify_system", "period", period, unit="s", above=0)
     u, y = sampled_motion("identify_system", u, y, least=2)
     _check_sizes(u, y, order, block_rows)
     sizes = [np.linalg.norm(x - x.mean(axis=0), axis=0) / np.sqrt(len(x)) for x in (u, y)]

@@ -47,13 +47,13 @@ def design_q(
     axis one, several or None; samples: of the window in which the worst of the family is checked over a whole run.
     Raises ModelError for responses of different periods or axes, for a law that goes by a model, and where no filter holds.
     """
-    number("design_q", "limit", limit, above=0.0)
-    number("design_q", "margin", margin, above=0.0, below=1.0)
+    limit = number("design_q", "limit", limit, above=0.0)
+    margin = number("design_q", "margin", margin, above=0.0, below=1.0)
     whole("design_q", "notches", notches, least=0, most=6)
     whole("design_q", "samples", samples, least=1)
     family, law = members_of(responses, learning)
     period = float(family[0].period or 0.0)
-    number("design_q", "limit", limit, below=0.5 / period)
+    limit = number("design_q", "limit", limit, below=0.5 / period)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])  # (members, F, m, m)
     named = _named(at, left.shape[-1], 0.5 / period)

@@ -34,7 +34,7 @@ def plot_q(
 
     if file is not None:
         check_suffix(file)
-    number("plot_q", "limit", limit, above=0.0)
+    limit = number("plot_q", "limit", limit, above=0.0)
     family, law = members_of(responses, learning)
     hz = frequencies(family)
     left = np.array([rest(member, law, hz) for member in family])

@@ -89,9 +89,9 @@ class ZeroPhase(Record):
 
 def notch(hz: float, width: float, depth: float) -> BiquadSection:
     """(p^2 + 2 width depth p + 1) / (p^2 + 2 width p + 1): gain depth at hz."""
-    number("ZeroPhase.notched", "hz", hz, above=0.0)
-    number("ZeroPhase.notched", "width", width, above=0.0)
-    number("ZeroPhase.notched", "depth", depth, least=0.0)
+    hz = number("ZeroPhase.notched", "hz", hz, above=0.0)
+    width = number("ZeroPhase.notched", "width", width, above=0.0)
+    depth = number("ZeroPhase.notched", "depth", depth, least=0.0)
     return BiquadSection(float(hz), (1.0, 2 * width * depth, 1.0), (1.0, 2 * width, 1.0))
 
 

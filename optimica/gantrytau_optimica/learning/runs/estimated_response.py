@@ -119,7 +119,7 @@ def estimated_response(
 
 
 def _check_numbers(place: str, amplitude: float, order: int | None, seed: int) -> None:
-    number(place, "amplitude", amplitude, above=0.0)
+    amplitude = number(place, "amplitude", amplitude, above=0.0)
     if order is not None:
         whole(place, "order", order, least=1)
     whole(place, "seed", seed, least=0)

@@ -86,11 +86,12 @@ def square_reference(
     edge: s of motion and stop; begin: s of rest before; duration: s. Raises ModelError for times that do not fit.
     """
     given = dict(size=size, move=move, edge=edge, begin=begin, duration=duration, period=period)
-    for name, value in given.items():
-        number("square_reference", name, value, above=0.0)
+    size, move, edge, begin, duration, period = (
+        number("square_reference", name, value, above=0.0) for name, value in given.items()
+    )
     whole("square_reference", "rounds", rounds, least=1)
-    number("square_reference", "move", move, most=edge)
-    number("square_reference", "begin", begin, least=2 * period)
+    move = number("square_reference", "move", move, most=edge)
+    begin = number("square_reference", "begin", begin, least=2 * period)
     if begin + 4 * rounds * edge > duration + period:
         raise ModelError(
             f"expected {begin + 4 * rounds * edge:g} s at least: {begin:g} s of rest and {4 * rounds} edges of {edge:g} s",

@@ -41,7 +41,7 @@ def detect(
     Raises ModelError for folders and arrays that hold no images, or of several sizes.
     """
     whole("detect", "background", background, least=0)
-    number("detect", "up", up)
+    up = number("detect", "up", up)
     frames = images.frames if isinstance(images, Images) else images
     if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
         found = Given("images", images)

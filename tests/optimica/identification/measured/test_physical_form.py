@@ -332,7 +332,7 @@ def test_systems_that_have_no_such_form(system, error, words):
     ("motion", "words"),
     [
         (U, r"measured=ndarray, expected \(u, y\)"),
-        ((U, Y[:, :1]), "found y of 50 x 1, expected numbers, n x 2"),
+        ((U, Y[:, :1]), "found y of 50 x 1, expected n x 2 numbers"),
         ((U, Y[:40]), "50 samples of u and 40 of y"),
         ((U[:9], Y[:9]), "9 samples of u and 9 of y, expected as many of both, 40 at least"),
         ((U, 0 * Y), r"found that y\[0\] never changes"),

@@ -53,7 +53,7 @@ def test_a_picture_shows_errors_over_places(tmp_path):
 @pytest.mark.parametrize(
     ("r", "reference", "words"),
     [
-        (REFERENCE[:4], REFERENCE[:5], "found reference of 5 x 3, expected numbers, 4 x 3"),
+        (REFERENCE[:4], REFERENCE[:5], "found reference of 5 x 3, expected 4 x 3 numbers"),
         (REFERENCE[:3], REFERENCE[:3], "found 3 places that both measured, expected at least 4"),
         (np.outer(np.arange(9), [1.0, 2, 3]), np.outer(np.arange(9), [1.0, 2, 3]), "places on one line"),
         (1000 * REFERENCE, REFERENCE, "1e\\+03 times as large as reference, expected both in m; divide mm"),
