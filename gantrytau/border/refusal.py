@@ -125,7 +125,7 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
 
     describe: a function from a name to words set in parentheses behind it.
     """
-    names = list(names)
+    names = list(dict.fromkeys(names))
     close = difflib.get_close_matches(wrong, names, n=1, cutoff=0.5)
     if close:
         words = describe(close[0]) if describe else ""

@@ -45,7 +45,10 @@ class Samples:
         if self.largest_gap is not None:
             gap = number("Samples", "largest_gap", self.largest_gap, above=0.0, most=np.inf)
             object.__setattr__(self, "largest_gap", gap)
-        times, values = (array("Samples", n, getattr(self, n), finite=False) for n in ("times", "values"))
+        times = array("Samples", "times", self.times, finite=False)
+        switch = getattr(getattr(self.values, "dtype", None), "kind", "") == "b"  # logged as False and True
+        values = self.values.astype(float) if switch else self.values
+        values = array("Samples", "values", values, finite=False)
         if values.ndim == 1:
             values = values[:, None]
         if self.unit is not None:

@@ -295,6 +295,7 @@ def test_figures(tmp_path):
         (lambda: workspace(L1, box=[[0, 1], [0, 1], [1, 0]]), "found box=.* expected pairs"),
         (lambda: workspace(L1, box=BOX, spacing=1e-5), "expected 2e.07 at most"),
         (lambda: workspace(L1, Limits(strokes=[[0, 1]] * 2), box=BOX), "found strokes of 2 x 2"),
+        (lambda: Limits(clearance=np.inf), "found clearance=inf, expected a finite number"),
         (lambda: workspace(L1, Limits(strokes=(1, 0)), box=BOX), "found strokes=.* expected .least, largest"),
         (lambda: workspace(L1, Limits(ball_joint=0.5, cart_axes=[0, 0, 0]), box=BOX), "found cart_axes"),
         (lambda: workspace(L1, Limits(ball_joint=0.5, home=[9, 9, 9]), box=BOX), "found cart_axes .*in"),

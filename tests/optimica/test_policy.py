@@ -1,7 +1,9 @@
 """The policy of a solve: its keywords are those of `optimize`, and every verb takes its own of them."""
 
 import inspect
+import math
 from dataclasses import fields
+from fractions import Fraction
 
 import pytest
 
@@ -68,3 +70,9 @@ def test_estimations_do_not_shoot():
     with pytest.raises(ModelError, match="estimate: found scheme='shooting', expected 'radau'") as caught:
         estimate(Model, {}, [], scheme="shooting")
     assert caught.value.argument == "scheme"
+
+
+def test_infinite_time_is_no_limit_and_what_is_called_a_number_becomes_one():
+    policy = Policy(max_time=math.inf, tolerance=Fraction(1, 1000))  # type: ignore[arg-type]
+    assert (policy.max_time, policy.tolerance) == (math.inf, 0.001)
+    assert type(policy.tolerance) is float

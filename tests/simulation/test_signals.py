@@ -238,3 +238,7 @@ def test_arrays_of_samples_cannot_be_changed_behind_their_back():
     assert simulate(translate(Integrator()), stop=1.0, inputs={"u": samples}).final("x") == pytest.approx(0.5)
     with pytest.raises(ValueError, match="read-only"):
         samples.values[0] = 1.0
+
+
+def test_a_logged_switch_is_0_and_1():
+    assert Samples([0, 1], np.array([False, True])).values.ravel().tolist() == [0.0, 1.0]

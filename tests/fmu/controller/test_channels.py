@@ -83,3 +83,8 @@ def test_wrong_declarations_say_what_is_expected(make, argument, words):
         make()
     assert error.value.argument == argument
     assert words in str(error.value)
+
+
+def test_an_infinite_limit_is_none():
+    channel = Channel("q", "m", minimum=-np.inf, maximum=np.inf)
+    assert (channel.minimum, channel.maximum) == (-np.inf, np.inf)

@@ -91,3 +91,7 @@ def test_files_that_are_no_fmus_are_refused(tmp_path, build, halves):
             cosimulate({"a": file}, stop=1.0, step=0.1)
     with pytest.raises(ModelError, match=r"found components=\{\}, expected"):
         cosimulate({}, stop=1.0, step=0.1)
+
+
+def test_a_time_may_bring_its_unit():
+    assert Master(timeout="1 min").timeout == 60.0  # type: ignore[arg-type]

@@ -17,6 +17,7 @@ from gantrytau_optimica import (
     optimize,
     sum_of_squares,
 )
+from gantrytau_optimica.estimation import Experiment
 from tests.optimica.problems import Mass
 
 
@@ -254,3 +255,8 @@ def test_a_gap_may_be_allowed():
 def test_sums_outside_of_a_problem():
     with pytest.raises(ModelError, match="sum_of_squares was used outside of an optimisation problem"):
         sum_of_squares(3.0, Samples([0.0], [1.0]))
+
+
+def test_the_times_of_an_experiment_may_bring_their_unit():
+    found = Experiment({"x": ([0.0, 1.0], [0.0, 1.0])}, begin="100 ms", stop="0.5 s")  # type: ignore[arg-type]
+    assert (found.begin, found.stop) == (0.1, 0.5)

@@ -343,3 +343,7 @@ def test_a_wrong_argument_is_refused_by_its_name(make, argument, wrong):
 def test_arrays_that_do_not_belong_together_are_refused(wrong):
     with pytest.raises(ModelError, match="expected"):
         wrong()
+
+
+def test_a_tracker_without_a_farthest_distance_sees_everything():
+    assert LaserTracker([0, 0, 0], farthest=np.inf).measure([[0.0, 1e4, 0.0]]).seen.all()
