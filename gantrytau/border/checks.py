@@ -129,7 +129,7 @@ def array(
     if not values.shape and not _fits((), *shapes):
         raise _refused(place, argument, found, wanted)
     if not _fits(values.shape, *shapes):
-        size = f"{len(values)} numbers" if values.ndim == 1 else " x ".join(map(str, values.shape))
+        size = numbers_of(values.shape) if values.ndim == 1 else " x ".join(map(str, values.shape))
         raise ModelError(f"found {argument} of {size}, expected {wanted}", place=place, argument=argument)
     wrong = ~np.isfinite(values) if finite else np.zeros(values.shape, dtype=bool)
     if least is not None:
