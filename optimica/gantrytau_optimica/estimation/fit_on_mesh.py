@@ -12,6 +12,7 @@ import numpy as np
 
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
 from gantrytau_optimica.estimation.weights import Weighing, Weights
+from gantrytau_optimica.fitting.linear import column_norms, linear_least_squares
 from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program
 
@@ -144,12 +145,11 @@ def bounded_step(
     """The step (k,) within low and high that makes |errors + jacobian step| least; of several the smallest."""
     from scipy.optimize import lsq_linear
 
-    norms = np.linalg.norm(jacobian * sizes, axis=0)
-    norms = sizes / np.where(norms > 0, norms, 1.0)
-    step = norms * np.linalg.lstsq(jacobian * norms, -errors, rcond=RANK)[0]
+    scaled = jacobian * sizes
+    step = sizes * linear_least_squares(scaled, -errors, RANK)
     if np.all((step >= low) & (step <= high)):
         return step
-    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    norms, low, high = sizes / column_norms(scaled), np.minimum(low, 0.0), np.maximum(high, 0.0)
     open_ = high - low > 0
     inside = lsq_linear(
         jacobian[:, open_] * norms[open_], -errors, ((low / norms)[open_], (high / norms)[open_]), "bvls"

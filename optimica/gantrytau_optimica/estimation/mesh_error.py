@@ -15,6 +15,7 @@ import numpy as np
 from gantrytau_optimica.estimation.corners import corners
 from gantrytau_optimica.estimation.fit_on_mesh import RANK, MeshFit, bounded_step
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
+from gantrytau_optimica.fitting.linear import column_norms
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.layout import Layout
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -126,8 +127,7 @@ def carried_over(program: Program, w: np.ndarray, other: Program) -> np.ndarray:
 
 def _inverse(jacobian: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Pseudoinverse (k, N) of a Jacobian (N, k), by columns of equal length."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms = np.where(norms > 0, norms, 1.0 / sizes)
+    norms = column_norms(jacobian * sizes) / sizes
     return np.linalg.pinv(jacobian / norms, rcond=RANK) / norms[:, None]
 
 

@@ -18,6 +18,7 @@ from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
 from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
+from gantrytau_optimica.fitting.linear import inverse_root
 from gantrytau_optimica.fitting.robust import robust_deviation
 
 FEW = 3  # samples, of which rates are known
@@ -98,9 +99,7 @@ class ParameterFit(Record):
     @cached_property
     def _covariance(self) -> np.ndarray:
         """(k, k) of `names`, by the singular values of the normed slopes, with what the mesh costs as one more error."""
-        norms = np.linalg.norm(self.jacobian, axis=0)
-        _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
-        root = right.T / singular / norms[:, None]
+        root = inverse_root(self.jacobian)
         shift = np.nan_to_num([self.mesh_shift[n] for n in self.names])
         inverse = root @ root.T
         coloured = self.loss == "squares" and any(f.kind in COLOURED for f in self.diagnostics.facts)

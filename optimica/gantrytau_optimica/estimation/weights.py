@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import column_norms
 from gantrytau_optimica.fitting.robust import huber_weights, robust_deviation
 
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
@@ -81,6 +82,5 @@ class Weighing:
 
 def _told(jacobian: np.ndarray) -> np.ndarray:
     """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the Jacobian."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    basis, singular, _ = np.linalg.svd(jacobian / np.where(norms > 0, norms, 1.0), full_matrices=False)
+    basis, singular, _ = np.linalg.svd(jacobian / column_norms(jacobian), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)

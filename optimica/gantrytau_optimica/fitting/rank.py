@@ -18,6 +18,7 @@ from scipy.linalg import qr, solve_triangular
 from scipy.sparse.csgraph import connected_components
 
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.linear import column_norms
 
 PIVOT = 1e-9  # of a normed column, below which what pivots leave of it is rounding
 EMPTY = 1e-13  # of the largest column, below which one is rounding throughout
@@ -171,8 +172,7 @@ def null_space(
     A small singular value is one of rounding, and its vector null, if the finer mesh does not confirm what it moves.
     """
     columns = point.jacobian * sizes
-    norms = np.linalg.norm(columns, axis=0)
-    norms = np.where(norms > 0, norms, 1.0)
+    norms = column_norms(columns)
     columns = columns / norms
     _, singular, right = np.linalg.svd(columns, full_matrices=False)
     null, resolved = [], True

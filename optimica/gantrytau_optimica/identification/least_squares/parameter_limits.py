@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import linear_least_squares
 from gantrytau_optimica.identification.least_squares.factors import Factors
 
 GAP = 1e-8  # of the sum of squares, which a minimum within conditions may leave too much
@@ -79,10 +80,9 @@ def within(
         for _ in range(STEPS):
             S, right = barrier.linear(p)
             A = np.vstack([factors.R, np.sqrt(mu) * S])[:, free]
-            norms = np.linalg.norm(A, axis=0) + 1e-300
             b = np.concatenate([factors.d - factors.R @ p, np.sqrt(mu) * right])
             step = np.zeros(len(p))
-            step[free] = np.linalg.lstsq(A / norms, b, rcond=None)[0] / norms
+            step[free] = linear_least_squares(A, b)
             now, decrement = (
                 factors.squares(p) / 2 + mu * barrier.value(p),
                 float(np.sum((A @ step[free]) ** 2)),
