@@ -37,8 +37,15 @@ def not_told_apart(names: Sequence[str], determined: Sequence[str]) -> str:
     """The sentence on parameters that data do not tell apart; determined: combinations of them, none for no influence."""
     if not determined:
         return f"nothing that was measured depends on {listed(names)}"
-    only = f"only {listed(determined)} {'is' if len(determined) == 1 else 'are'} determined"
-    return f"{listed(names)} cannot be told apart by these data: {only}"
+    verb = "is" if len(determined) == 1 else "are"
+    return f"{indistinguishable(names)}: only {listed(determined)} {verb} determined"
+
+
+def indistinguishable(names: Sequence[str]) -> str:
+    """The same sentence without the combinations, for parameters of one null direction; one name alone has no influence."""
+    return (
+        f"{listed(names)} cannot be told apart by these data" if len(names) > 1 else not_told_apart(names, ())
+    )
 
 
 def listed(words: Sequence[str]) -> str:
