@@ -8,7 +8,7 @@ S scales the parameters so that their steps compare. Along directions with a sma
 do not determine stays where it began.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -84,11 +84,17 @@ class Minimum(Record):
 
 @dataclass(frozen=True)
 class Prior(Record):
-    """Rows weight (x_i - value) of parameters by index; weights: the noise of a residual over standard deviations."""
+    """Rows weight (x_i - value) of parameters by index; weights: noise of a residual over their standard deviations."""
 
     indices: Sequence[int] | np.ndarray
     values: Sequence[float] | np.ndarray
     weights: Sequence[float] | np.ndarray
+
+    @classmethod
+    def of(cls, expected: Mapping[int, tuple[float, float]], noise: float) -> "Prior":
+        """Rows of parameters by index with (value, standard deviation); noise: standard deviation of a residual."""
+        values, deviations = [v for v, _ in expected.values()], [d for _, d in expected.values()]
+        return cls(list(expected), values, [noise / d for d in deviations])
 
 
 def least_squares(

@@ -18,7 +18,7 @@ from gantrytau.kinematics.rotations import left_jacobian, motion, of_vector, rot
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.links.arm_factors import LEVER
-from gantrytau_optimica.calibration.links.groups import TAPE
+from gantrytau_optimica.calibration.links.groups import TAPE, tape_limit
 from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squares
 from gantrytau_optimica.fitting.robust import (
     OUTLIER,
@@ -94,15 +94,13 @@ class PoseResiduals(Record):
 
     def minimum(self, x: Array, noise: float) -> Minimum:
         """Least squares from x; what poses tell less of than a tape measure stays there, by the noise, m."""
-        held = self.prior.values()
-        prior = Prior(list(self.prior), [m for m, _ in held], [noise / deviation for _, deviation in held])
         return least_squares(
             lambda x: (self.poses(x) * self.weights[:, None]).ravel(),
             self.weighted_jacobian,
             x,
             scale=self.scale,
-            priors=[prior],
-            smallest=noise / TAPE * (1 - 1e-6),
+            priors=[Prior.of(self.prior, noise)],
+            smallest=tape_limit(noise),
         )
 
     def weighted_jacobian(self, x: Array) -> Array:

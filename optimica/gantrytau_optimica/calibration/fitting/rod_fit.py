@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.links.groups import Group
+from gantrytau_optimica.calibration.links.groups import Group, tape_limit
 from gantrytau_optimica.fitting.least_squares import Minimum, Prior, limit_of
 from gantrytau_optimica.fitting.robust import (
     huber_weights,
@@ -87,7 +87,7 @@ def fit_group(
     """
     x, rows = group.x if begin is None else begin, group.condensed(weights)
     if group.noise is not None and smallest is None:
-        limit = group.noise / group.tape * (1 - 1e-6)  # a prior as wide as a tape measure counts
+        limit = tape_limit(group.noise, group.tape)
         return Fit(group, rows.minimum(x, group.noise, smallest=limit), weights)
     if smallest is None:
         minimum, noise = rows.minimum(x, 0.0), 0.0
