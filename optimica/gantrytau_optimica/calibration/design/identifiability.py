@@ -32,7 +32,7 @@ NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weak
 
 
 class PoseArrays(NamedTuple):
-    """What was measured: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
+    """Measured poses: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
 
     q: np.ndarray
     r: np.ndarray

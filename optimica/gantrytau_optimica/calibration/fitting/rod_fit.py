@@ -1,4 +1,4 @@
-"""Groups of links brought to their minima: truncation of what data do not hold, robust weights."""
+"""Least squares of groups of links: truncation of undetermined directions, robust weights."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ class Fit(Record):
 
     @property
     def smallest(self) -> float:
-        """The singular value below which directions of a like group are held worse than by a tape measure."""
+        """Singular value below which a direction is known worse than by a tape measure."""
         return self.noise / self.group.tape
 
     def distances(self) -> np.ndarray:
@@ -75,7 +75,7 @@ def fit_group(
     begin: np.ndarray | None = None,
     smallest: float | None = None,
 ) -> Fit:
-    """The minimum of a group; what data hold worse than a tape measure stays near the start values.
+    """Minimum of a group; directions known worse than by a tape measure stay near the start values.
 
     weights: of the poses, (N,), or None; begin: where the search begins, instead of the start values; smallest: singular
     value below which directions are known not to be held.

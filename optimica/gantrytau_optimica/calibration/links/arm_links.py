@@ -1,4 +1,4 @@
-"""Links of an arm on turntables over the measured poses, by all unknowns of the arm: what `Chain` is without turntables."""
+"""Links of an arm on turntables over the measured poses, by all parameters of the arm; `Chain` has no turntables."""
 
 from dataclasses import dataclass
 
@@ -40,7 +40,7 @@ class ArmOverPoses:
         return self._known[1:]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of rotations from where the arm is by those from where it was, (p, p); None for the same.
+        """Jacobian (p, p) of rotations from the moved arm by rotations from its start; None for the unit matrix.
 
         exp([d + dd]x) = exp([d]x) exp([J(d)' dd]x) with the Jacobian J of the left.
         """
@@ -113,7 +113,7 @@ class ArmLink(Record):
         return by_motion(arm.directions(here.q, here.r, here.R)[:, self.j], here.R, offset)
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the parameters that are reported by those that are moved; None for the same."""
+        """Jacobian of the reported parameters by the fitted ones; None for the unit matrix."""
         return self.poses.told(p)
 
 

@@ -95,10 +95,10 @@ class Chain(Record):
         return np.linalg.norm(self.vector(p), axis=1) - p[0]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the parameters that are reported by those that are moved, (size, size), None for the same.
+        """Jacobian (size, size) of the reported parameters by the fitted ones, None for the unit matrix.
 
-        Turns of measured guideways are moved before a rotation that was given: what is reported is the rotation vector W of
-        both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
+        The turn of a measured guideway is fitted before a given rotation; reported is the rotation vector W of both:
+        exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
         """
         if self.points is None:
             return None

@@ -21,12 +21,12 @@ def tape_limit(noise: float, tape: float = TAPE) -> float:
 
 @dataclass(frozen=True)
 class Group(Record):
-    """Links and where in the vector x of the group their parameters stand.
+    """Links with common parameters x.
 
-    x: start values (n,); names: of the parameters, (n,); free: which of them are identified; scale: what of each moves a
-    joint by a metre; places: for each link the indices in x of its parameters; prior: value and standard deviation of
-    parameters, by index; noise: standard deviation of a closure error that decides what data hold, None where it is to be
-    found from what is left; tape: that of start values, m.
+    x: start values (n,); names: of the parameters, (n,); free: mask of the identified ones; scale: change of each for a
+    metre at a joint; places: indices in x of the parameters of each link; prior: value and standard deviation by index;
+    noise: standard deviation of a closure error, None to estimate it from the residuals; tape: standard deviation of the
+    start values, m.
     """
 
     chains: tuple[Chain | ArmLink, ...]
@@ -83,7 +83,7 @@ class Group(Record):
         return least_squares(self.residuals, self.jacobian, x, scale=scale, priors=rows, **along)
 
     def started(self, x: np.ndarray) -> "Group":
-        """The same with other start values."""
+        """This group with other start values."""
         return replace(self, x=x.copy())
 
     def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "Group":

@@ -41,7 +41,7 @@ class Condition:
         return p[self.places] + share * away
 
     def eigenvalues(self, p: np.ndarray) -> np.ndarray:
-        """Of the matrix whose diagonal is normed, (n,)."""
+        """Eigenvalues (n,) of the matrix, scaled to a diagonal of ones."""
         C = self.at(p)
         size = np.sqrt(np.abs(np.diag(C)))
         size = np.maximum(size, 1e-9 * np.max(size))  # a thin plate has none across
@@ -50,7 +50,7 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class ParameterLimits:
-    """What parameters can be: least (k,), -inf for none, and conditions on several together."""
+    """Limits of parameters: least (k,), -inf for none, and conditions on several together."""
 
     least: np.ndarray
     conditions: tuple[Condition, ...] = ()

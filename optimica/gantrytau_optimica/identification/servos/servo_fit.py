@@ -34,7 +34,7 @@ class ServoRows:
 
 @dataclass(frozen=True, eq=False)
 class ServoFit:
-    """What fits best. covariance: (2, 2) of pole and gain; rest: c of each step; latest: longest delay looked at.
+    """Best fit of one actuator. covariance: (2, 2) of pole and gain; rest: c of each step; latest: longest delay looked at.
 
     left: sums of squares by delay, of those that were looked at closely; residuals: by step.
     """
