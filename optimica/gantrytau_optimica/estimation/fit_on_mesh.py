@@ -1,8 +1,9 @@
-"""Least squares on one mesh, from an answer nearby: steps of Gauss and Newton on the manifold of the equations.
+"""Least squares on one mesh, from an answer nearby: Gauss-Newton on the manifold of the equations.
 
     minimise |V (r + J dp)|^2 over dp within limits;   p + share dp, and the motion to it by Newton's method
 
-where V holds the weights of the residuals. Where a limit of the model's variables is in the way, Ipopt goes on.
+V: weights of the residuals. Ipopt continues where a limit of the model's variables is active. `fitting/least_squares.py` has
+neither manifold nor limits, and this iteration ends by standard deviations: hence its own loop.
 """
 
 from collections.abc import Callable
@@ -12,13 +13,14 @@ import numpy as np
 
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
 from gantrytau_optimica.estimation.weights import Weighing, Weights
+from gantrytau_optimica.fitting.linear import column_norms, linear_least_squares
 from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.program import Program
 
 STEPS = 25
-SETTLED = 1e-5  # of a deviation, or
+SETTLED = 1e-5  # of a standard deviation, or
 ROUGH, FIRM = 1e-3, 1e-2  # of it, that rounding may leave, and that limits of the model must cost to bind
-FINE = 1e-11  # of its size: a step of a number that changes nothing more
+FINE = 1e-11  # of its size: a negligible step of a parameter
 SHARES = 0.5 ** np.arange(12)
 RANK = 1e-11  # of the largest singular value of the normed Jacobian: directions in which no step is taken
 LIMIT = 1e-7  # of typical sizes, by which a limit of the model may be passed
@@ -33,9 +35,9 @@ Step = Callable[[float], None]  # told of the sum of squares before every step; 
 
 @dataclass(frozen=True, eq=False)
 class MeshFit:
-    """Numbers and motion on one mesh: unknowns w (n,), residuals (N,) and their Jacobian (N, k) as the program weighs them.
+    """Parameters and motion on one mesh: unknowns w (n,), residuals (N,) and Jacobian (N, k), over standard deviations.
 
-    limited: whether limits of the model's variables hold the motion.
+    limited: whether limits of the model's variables are active.
     """
 
     residuals: Residuals
@@ -47,18 +49,18 @@ class MeshFit:
 
     @property
     def numbers(self) -> np.ndarray:
-        """The free numbers, (k,)."""
+        """Free parameters, (k,)."""
         return self.w[self.residuals.program.places.free]
 
     @property
     def sizes(self) -> np.ndarray:
-        """Typical sizes of the free numbers, (k,)."""
+        """Typical sizes of the free parameters, (k,)."""
         scale = self.residuals.program.places.scale[self.residuals.program.places.free]
         return np.maximum(np.abs(self.numbers), 1e-3 * scale)
 
     @property
     def inner(self) -> np.ndarray:
-        """Which free numbers stand at no limit, (k,)."""
+        """Mask of the free parameters without an active limit, (k,)."""
         free = self.residuals.program.problem.free
         low, high = np.array([n.min for n in free]), np.array([n.max for n in free])
         near = AT_BOUND * np.array([n.nominal or 1.0 for n in free])
@@ -127,7 +129,7 @@ def descended(found: Residuals, w: np.ndarray, weights: Weights, step: Step) -> 
 
 
 def _change(found: Residuals, at: np.ndarray, roots: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """The next step of the free numbers, what it gains, and the deviation of the weighed residuals."""
+    """Next step of the free parameters, its gain, and the standard deviation of the weighted residuals."""
     program = found.program
     free = program.places.free
     scale = program.places.scale[free]
@@ -144,12 +146,11 @@ def bounded_step(
     """The step (k,) within low and high that makes |errors + jacobian step| least; of several the smallest."""
     from scipy.optimize import lsq_linear
 
-    norms = np.linalg.norm(jacobian * sizes, axis=0)
-    norms = sizes / np.where(norms > 0, norms, 1.0)
-    step = norms * np.linalg.lstsq(jacobian * norms, -errors, rcond=RANK)[0]
+    scaled = jacobian * sizes
+    step = sizes * linear_least_squares(scaled, -errors, RANK)
     if np.all((step >= low) & (step <= high)):
         return step
-    low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+    norms, low, high = sizes / column_norms(scaled), np.minimum(low, 0.0), np.maximum(high, 0.0)
     open_ = high - low > 0
     inside = lsq_linear(
         jacobian[:, open_] * norms[open_], -errors, ((low / norms)[open_], (high / norms)[open_]), "bvls"
@@ -172,9 +173,9 @@ def _inside(found: Residuals, w: np.ndarray, room: float) -> bool:
 
 
 def solution_at(program: Program, w: np.ndarray, before: Solution) -> Solution:
-    """Unknowns w of a fit as a solution of its program, with the multipliers that belong to them.
+    """Unknowns w of a fit as a solution of its program, with its multipliers.
 
-    Of the equations, G_y^T lambda = -f_y; of the limits, what is then left of the gradient by the free numbers.
+    Equations: G_y^T lambda = -f_y; limits: the remaining gradient by the free parameters.
     """
     found = residuals(program)
     x, free, scale = w / program.places.scale, program.places.free, program.places.scale

@@ -1,4 +1,4 @@
-"""How far an estimate lies off because the motion is computed on a mesh, and in which elements that arises.
+"""Discretisation error of an estimate, and its contributions by element.
 
     every element cut into two:  r': residuals on the finer mesh at the same numbers;  dp = -(J'^T J')^-1 J'^T r'
 
@@ -15,6 +15,7 @@ import numpy as np
 from gantrytau_optimica.estimation.corners import corners
 from gantrytau_optimica.estimation.fit_on_mesh import RANK, MeshFit, bounded_step
 from gantrytau_optimica.estimation.residuals import Residuals, residuals
+from gantrytau_optimica.fitting.linear import column_norms
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.layout import Layout
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -33,12 +34,12 @@ INNER = 0.02  # of an element, off its ends: where it is cut at a corner
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """What the mesh of a fit costs.
+    """Discretisation error of a fit on its mesh.
 
-    finer, w: the mesh of twice the elements, and the motion on it with the numbers of the fit; jacobian (N, k): derivatives
-    there; shift (k,): how far the best numbers there are off, about; parts: by phase, contributions (elements, k);
-    deviations (k,): of the numbers there; allowed (k,): shifts that hardly matter; misfit: whether chi-square is more
-    than that of the noise because of the mesh.
+    finer, w: the mesh of twice the elements, and the motion on it with the parameters of the fit; jacobian: (N, k) there;
+    shift: change of the parameters there, about, (k,); parts: contributions (elements, k) to it, by phase; deviations:
+    standard deviations there, (k,); allowed: negligible shifts, (k,); misfit: whether the mesh raises chi-square above
+    the noise.
     """
 
     finer: Residuals
@@ -52,19 +53,19 @@ class MeshError:
 
     @property
     def stands(self) -> bool:
-        """Whether the mesh hardly matters."""
+        """Whether the discretisation error is negligible."""
         return self.numbers_stand and not self.misfit
 
     @property
     def numbers_stand(self) -> bool:
-        """Whether it hardly matters to the numbers."""
+        """Whether the shift of the parameters is negligible."""
         parts = np.concatenate([np.zeros((1, self.shift.size)), *self.parts])
         whole = np.linalg.norm(parts, axis=0)
         return bool(np.all(np.abs(self.shift) <= self.allowed) and np.all(whole <= CANCELLED * self.allowed))
 
 
 def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
-    """What the mesh costs; None where the motion on a finer one is not found. known: deviations of the data were given."""
+    """Discretisation error; None where no motion on a finer mesh is found. known: the data have standard deviations."""
     program = fit.residuals.program
     finer = residuals(transcribed_again(program, meshes=halved(fit)))
     near = carried_over(program, fit.w, finer.program)
@@ -92,7 +93,7 @@ def mesh_error(fit: MeshFit, known: bool) -> MeshError | None:
 
 
 def error_against(fit: MeshFit, finer: MeshFit, known: bool) -> MeshError:
-    """The same from a fit on a finer mesh, where limits of the model hold the motion and steps do not tell."""
+    """Discretisation error from a fit on a finer mesh, for motions at active limits of the model."""
     inner, roots = finer.inner, finer.weights.roots
     inverse = _inverse(finer.jacobian[:, inner] * roots[:, None], finer.sizes[inner])
     deviations = np.zeros(fit.numbers.size)
@@ -126,8 +127,7 @@ def carried_over(program: Program, w: np.ndarray, other: Program) -> np.ndarray:
 
 def _inverse(jacobian: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Pseudoinverse (k, N) of a Jacobian (N, k), by columns of equal length."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    norms = np.where(norms > 0, norms, 1.0 / sizes)
+    norms = column_norms(jacobian * sizes) / sizes
     return np.linalg.pinv(jacobian / norms, rcond=RANK) / norms[:, None]
 
 

@@ -1,6 +1,6 @@
-"""Fitted parameters: how sure they are, and what is left of the data.
+"""Fitted parameters: their covariance, and the residuals of the data.
 
-cov p = (J'J)^-1 J' cov(e) J (J'J)^-1        cov(e) of each output and experiment by the spectrum of e, where e is no noise
+cov p = (J'J)^-1 J' cov(e) J (J'J)^-1        cov(e) of each output and experiment by the spectrum of e, if e is coloured
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +18,7 @@ from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
 from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
+from gantrytau_optimica.fitting.linear import inverse_root
 from gantrytau_optimica.fitting.robust import robust_deviation
 
 FEW = 3  # samples, of which rates are known
@@ -37,14 +38,13 @@ ENDS = {
 class ParameterFit(Record):
     """`fit.parameters["k"]` is a float in the model's unit.
 
-    parameters: all estimated numbers by name; at_bounds: those that stand at a limit, which have no deviation;
-    jacobian: slopes of the residuals in deviations, (N, k), for the parameters `names` that are at no limit; errors:
-    these residuals, model less measured, (N,); scales: the deviations, (N,), 1 for one output without, and for several
-    those that the fit leaves of each; known: whether the deviations were given; weights: (N,) of a robust fit, else ones;
-    mesh_shift: by how much the parameters would move on half as long elements, about, by name, and finer_deviations: how
-    sure they would be there (NaN: not found); limited: whether limits of the model's variables bind; ended: why the mesh
-    was not refined until the estimate stood ("": it stands); optimum: the solved problem, whose objective is a multiple
-    of the sum of squares.
+    parameters: estimated values by name; at_bounds: parameters with an active limit, without a standard deviation;
+    names: of the other parameters; errors: residuals (N,), model less measured, over `scales`; jacobian: (N, k) of the
+    errors by `names`; scales: standard deviations (N,), 1 for one output without, for several by the residuals of each;
+    known: whether standard deviations were given; weights: (N,) of a robust fit, else ones; mesh_shift: change of each
+    parameter on half as long elements, about; finer_deviations: standard deviations there (NaN: not found); limited:
+    whether limits of the model's variables are active; ended: why refinement of the mesh stopped too early ("": it did
+    not); optimum: the solved problem, its objective a multiple of the sum of squares.
     """
 
     name: str
@@ -88,7 +88,7 @@ class ParameterFit(Record):
 
     @property
     def probability(self) -> float:
-        """That noise of the given deviations leaves as large a chi_square; NaN where none were given."""
+        """Probability of as large a chi_square by noise of the given standard deviations; NaN without them."""
         from scipy import stats
 
         return (
@@ -97,10 +97,8 @@ class ParameterFit(Record):
 
     @cached_property
     def _covariance(self) -> np.ndarray:
-        """(k, k) of `names`, by the singular values of the normed slopes, with what the mesh costs as one more error."""
-        norms = np.linalg.norm(self.jacobian, axis=0)
-        _, singular, right = np.linalg.svd(self.jacobian / norms, full_matrices=False)
-        root = right.T / singular / norms[:, None]
+        """Covariance (k, k) of `names`; the discretisation error counts as one more error."""
+        root = inverse_root(self.jacobian)
         shift = np.nan_to_num([self.mesh_shift[n] for n in self.names])
         inverse = root @ root.T
         coloured = self.loss == "squares" and any(f.kind in COLOURED for f in self.diagnostics.facts)
@@ -113,7 +111,7 @@ class ParameterFit(Record):
 
     @cached_property
     def diagnostics(self) -> Diagnostics:
-        """What is left of each output: explained share, size against given deviations, whiteness, strays, trends."""
+        """Residuals of each output: explained share, size over given standard deviations, whiteness, strays, trends."""
         squares = self.loss == "squares"
         found = diagnose(
             self._series, known=repeated(courses(self.experiments)), remedies={"outliers": STRAYS}
@@ -122,7 +120,7 @@ class ParameterFit(Record):
 
     @property
     def _factor(self) -> float:
-        """Of the inverse of J'J: variance of the noise, for a robust fit that of Huber (1981), section 7.6."""
+        """Factor of (J'J)^-1: variance of the noise, for a robust fit by Huber (1981), section 7.6."""
         if self.loss == "squares":
             return 1.0 if self.known else self.variance
         inside = self.weights == 1.0
@@ -189,7 +187,7 @@ class ParameterFit(Record):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to hold in mind before the numbers are used."""
+        """Messages to read before the parameters are used."""
         found = [
             f"{name} stands at its limit {bound:.6g}: it has no deviation, and those of the others hold it there"
             for name, bound in self.at_bounds.items()
@@ -210,14 +208,14 @@ class ParameterFit(Record):
         return (*found, *(f.message for f in self.diagnostics.findings), *self._computed())
 
     def _computed(self) -> list[str]:
-        """Words for outputs without deviations that the model meets as closely as only computed values are met."""
+        """Message for outputs with residuals as small as those of computed data, without standard deviations."""
         explained = {} if self.known or self.freedom <= 0 else self.diagnostics.explained
         names = [n for n, share in explained.items() if 1 - share <= COMPUTED**2]
         words = f"the residuals of {', '.join(names)} are below {COMPUTED:g} of the values, as those of computed data"
         return [f"{words}: the deviations are those of rounding, not of measuring"] if names else []
 
     def _mesh_words(self) -> list[str]:
-        """What the mesh costs, where that matters, and why it was not made finer."""
+        """Message on the discretisation error, if it matters, with the reason for which the mesh was not refined."""
         if not self.names or self.ended == "":
             return []
         ways = ENDS[self.ended]
@@ -250,7 +248,7 @@ def output_series(
     scales: np.ndarray,
     known: bool,
 ) -> list[ResidualSeries]:
-    """Series of the columns of all outputs, from model less measured (N,) in deviations `scales`, with slopes (N, k)."""
+    """Series of the columns of all outputs, from model less measured (N,) over `scales`, with Jacobian (N, k)."""
     found, begin = [], 0
     for experiment in experiments:
         for name, samples in experiment.measured.items():
@@ -281,7 +279,7 @@ def output_series(
 
 
 def coloured_product(series: Sequence[ResidualSeries]) -> np.ndarray:
-    """J' cov(e) J, (k, k), each series with its own spectrum; parameters have taken their share of what was there."""
+    """J' cov(e) J, (k, k), each series with its own spectrum, corrected for fitted degrees of freedom."""
     spectra = [averaged_spectrum(one.left) for one in series]
     pairs = [(one.jacobian, spectrum) for one, spectrum in zip(series, spectra, strict=True)]
     independent = sum(

@@ -1,6 +1,6 @@
-"""How the residuals of a fit move with the estimated numbers, on the manifold that the equations of the model are.
+"""Residuals of a fit and their Jacobian by the estimated parameters, on the manifold of the equations of the model.
 
-    w = (p, y): estimated numbers, all other unknowns; G(p, y) = 0: collocated equations and starts; r(p, y): residuals
+    w = (p, y): estimated parameters, all other unknowns; G(p, y) = 0: collocated equations and starts; r(p, y): residuals
     dr/dp = r_p - r_y G_y^-1 G_p
 
 All Jacobians are exact; G_y is factorised once. Bard (1974), Nonlinear Parameter Estimation, section 5.4, with the
@@ -34,7 +34,7 @@ CLOSER, CHORD = (
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Residuals (N,) in deviations of all samples of a program, and their exact Jacobian; w: unscaled unknowns (n,).
+    """Residuals (N,) over standard deviations of all samples, with their exact Jacobian; w: unscaled unknowns (n,).
 
     sizes: number of residuals of every sum over samples, in the order of the phases.
     """
@@ -64,16 +64,16 @@ class Residuals:
 
     @cached_property
     def equations(self) -> np.ndarray:
-        """Numbers of the rows that are equations."""
+        """Indices of the rows with equations."""
         return np.flatnonzero(self.program.lbg == self.program.ubg)
 
     @cached_property
     def others(self) -> np.ndarray:
-        """Numbers of the unknowns that are not estimated."""
+        """Indices of the unknowns other than estimated parameters."""
         return np.setdiff1d(np.arange(self.program.places.size), self.program.places.free)
 
     def jacobian(self, w: np.ndarray) -> np.ndarray:
-        """Jacobian (N, k) with respect to the free numbers in their units."""
+        """Jacobian (N, k) with respect to the free parameters in their units."""
         program, free = self.program, self.program.places.free
         by_unknowns = self._of_samples.at(w)
         found = by_unknowns[:, free].toarray()
@@ -84,7 +84,7 @@ class Residuals:
         return found / program.places.scale[free]
 
     def defects(self, w: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """What the defect of each equation at w changes in rows (k, N) @ residuals, to first order, (equations, k).
+        """First-order change (equations, k) of rows (k, N) @ residuals by the defect of each equation at w.
 
         For unknowns that are carried over from another mesh and do not fulfil the equations of this one.
         """
@@ -96,7 +96,7 @@ class Residuals:
         return -adjoint * (values - self.program.lbg)[self.equations, None]
 
     def multipliers(self, w: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Those of the equations, and of the limits of the free numbers, where the objective has a scaled gradient (n,)."""
+        """Multipliers of the equations and of limits of free parameters; gradient: scaled, of the objective, (n,)."""
         if not self.others.size:
             return np.zeros(0), -gradient[self.program.places.free]
         equations, factors = self._factorised(w)
@@ -105,7 +105,7 @@ class Residuals:
         return found, -gradient[free] - equations[:, free].T @ found
 
     def on_manifold(self, w: np.ndarray, numbers: np.ndarray) -> np.ndarray | None:
-        """Unknowns that fulfil the equations for other free numbers, by Newton's method from w; None if it fails."""
+        """Solution of the equations for other free parameters, by Newton's method from w; None if it fails."""
         scale, w = self.program.places.scale, w.copy()
         w[self.program.places.free] = numbers
         factors, fresh, before = self._last.get("factors"), False, np.inf

@@ -1,4 +1,4 @@
-"""How residuals are weighed: by given deviations, by the noise of each output as the fit leaves it, and strays less.
+"""Weights of residuals: by given standard deviations, by the residual noise of each output, and strays less.
 
     noise_g^2 = sum over the values of output g of residual^2 / (their number - the share of the parameters they tell)
 
@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import column_norms
 from gantrytau_optimica.fitting.robust import huber_weights, robust_deviation
 
 LEAST = 1e-7  # of the expected noise: that of computed data, which have none
@@ -21,14 +22,14 @@ FEWEST = 2  # degrees of freedom from which an output has its own noise; below, 
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """noise (N,): deviation of every residual in the units in which they come; huber (N,): weights at most 1 of strays."""
+    """Weights of residuals. noise (N,): standard deviation of each, in its unit; huber (N,): at most 1, of strays."""
 
     noise: np.ndarray
     huber: np.ndarray
 
     @staticmethod
     def even(count: int) -> "Weights":
-        """Those of residuals that come in deviations, without strays."""
+        """Weights 1 for residuals over their standard deviations, without strays."""
         return Weights(np.ones(count), np.ones(count))
 
     @property
@@ -39,7 +40,7 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class Weighing:
-    """outputs (N,): number of the output of every residual; known: whether the deviations were given."""
+    """Rule of the weights. outputs (N,): index of the output of each residual; known: standard deviations are given."""
 
     outputs: np.ndarray
     known: bool
@@ -60,7 +61,7 @@ class Weighing:
         return Weights.even(self.outputs.size)
 
     def weights(self, errors: np.ndarray, jacobian: np.ndarray, before: Weights) -> Weights:
-        """Weights that the residuals (N,) with the Jacobian (N, k) ask for; before: those they were fitted with."""
+        """Weights by residuals (N,) and Jacobian (N, k) of a fit; before: weights of this fit."""
         noise = before.noise if self.known else self._noise(errors, jacobian, before)
         if self.loss == "squares":
             return Weights(noise, before.huber)
@@ -80,7 +81,6 @@ class Weighing:
 
 
 def _told(jacobian: np.ndarray) -> np.ndarray:
-    """Share of a parameter that each value tells by itself, (N,): the diagonal of the projection on the Jacobian."""
-    norms = np.linalg.norm(jacobian, axis=0)
-    basis, singular, _ = np.linalg.svd(jacobian / np.where(norms > 0, norms, 1.0), full_matrices=False)
+    """Leverage of each value, (N,): the diagonal of the projection on the Jacobian."""
+    basis, singular, _ = np.linalg.svd(jacobian / column_norms(jacobian), full_matrices=False)
     return np.sum(basis[:, singular > 1e-12 * singular[0]] ** 2, axis=1) if singular.size else np.zeros(0)

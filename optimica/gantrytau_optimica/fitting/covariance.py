@@ -1,4 +1,4 @@
-"""Covariance of what least squares find, by the noise of the residuals.
+"""Covariance of parameters found by least squares, from the noise of the residuals.
 
 cov p = (J'J)^-1 J' cov(e) J (J'J)^-1               white: s^2 (J'J)^-1
 cov(x'e) = sum_f conj(X_f)' X_f S_f / N             noise whose neighbours are not independent; S: periodogram of e,
@@ -35,13 +35,13 @@ def named_covariance(
 
 
 def averaged_spectrum(left: np.ndarray, width: int | None = None, used: float = 1.0) -> np.ndarray:
-    """Power of what is left (N,) at the frequencies of rfft; width: frequencies in a mean; used: share of rows not zero."""
+    """Power spectrum of residuals (N,) at the frequencies of rfft; width: frequencies in a mean; used: nonzero share."""
     power = np.abs(np.fft.rfft(left)) ** 2 / (len(left) * used)
     return uniform_filter1d(power, max(3, width or round(len(power) ** 0.5)), mode="reflect")
 
 
 def product_covariance(x: np.ndarray, spectrum: np.ndarray) -> np.ndarray:
-    """Covariance (k, k) of x'e for columns x (N, k) and noise e of a spectrum."""
+    """Covariance (k, k) of x'e for columns x (N, k) and noise e with this spectrum."""
     count = len(x)
     seen = np.fft.rfft(x, axis=0)
     twice = np.full(len(spectrum), 2.0)  # but the mean, and the last of an even count
@@ -51,6 +51,6 @@ def product_covariance(x: np.ndarray, spectrum: np.ndarray) -> np.ndarray:
 
 
 def independent_share(spectrum: np.ndarray) -> float:
-    """Share of the rows that tell the size of the noise as so many independent ones would (Bartlett, 1946)."""
+    """Effective share of independent rows in the variance of the noise (Bartlett, 1946)."""
     square = float(np.mean(spectrum**2))
     return min(1.0, float(np.mean(spectrum)) ** 2 / square) if square > 0 else 1.0

@@ -33,7 +33,7 @@ CLIPPED = 5.0  # robust deviations: a single stray is no group
 
 @dataclass(frozen=True, eq=False)
 class ResidualSeries:
-    """What a fit leaves of one quantity in one run, in the order in which it was measured.
+    """Residuals of one quantity in one run, in the order of measurement.
 
     name: of the quantity, the same in all runs; left: measured less model (N,), NaN in rows that do not count; measured:
     what the fit was to explain (N,); noise: told deviations, a number or (N,); jacobian: derivatives of it by what was
@@ -73,7 +73,7 @@ class ResidualSeries:
 
 @dataclass(frozen=True, eq=False)
 class Diagnostics(Record):
-    """What a fit leaves, by the name of the quantity, and the facts that are no chance.
+    """Statistics of residuals by the name of the quantity, with the significant facts.
 
     explained: share of the signal; ratio: size over told noise; correlation: of neighbours; trends: share of what is left by
     the signal that it follows most. Quantities of which something is not known, or not asked, are missing there.
@@ -133,7 +133,7 @@ class _Quantity:
         return robust_deviation(self.robust, self.jacobian.shape[1])
 
     def spectrum(self, series: ResidualSeries, left: np.ndarray) -> np.ndarray:
-        """That of what is left in the rows that count of one run."""
+        """Spectrum of the residuals of one run, in the rows that count."""
         return averaged_spectrum(series.filled(left), used=max(float(np.mean(series.used)), 1e-9))
 
     def of(self, series: ResidualSeries) -> slice:
@@ -160,7 +160,7 @@ def diagnose(
     known: Sequence[Fact] = (),
     remedies: Mapping[str, str] | None = None,
 ) -> Diagnostics:
-    """What is left of a fit, looked at. known: facts beside it, of limits, fixed values and repeated data; remedies: what to
+    """Diagnostics of residuals. known: facts beside it, of limits, fixed values and repeated data; remedies: what to
     do by kind of fact, where the fit knows better.
     """
     found: tuple[dict, dict, dict, dict] = ({}, {}, {}, {})
@@ -240,7 +240,7 @@ def _size(one: _Quantity, noise: np.ndarray, ratios: dict[str, float]) -> Iterat
 def _of_order(
     one: _Quantity, correlations: dict[str, float], trends: dict[str, tuple[str, float]]
 ) -> Iterator[Fact]:
-    """What the remainder follows, else whether its neighbours are alike, else its strays."""
+    """Trend of the residuals, else correlation of neighbours, else strays."""
     followed = max(_trends(one), key=lambda f: f.share, default=None)
     if followed is not None:
         trends[one.name] = followed.cause, followed.share
@@ -264,7 +264,7 @@ def _of_order(
 
 
 def _correlation(one: _Quantity) -> tuple[float, float]:
-    """Of neighbours, that a filter has left apart; and how many pairs tell it. Strays count as little as noise does."""
+    """Correlation of neighbours that a filter keeps independent, and the number of pairs. Strays count as noise."""
     most = CLIPPED * max(robust_deviation(one.left), 1e-300)
     product = square = pairs = 0.0
     for s in one.series:

@@ -1,4 +1,4 @@
-"""What was noticed of a fit, as facts: kind, quantity, size, rows; words are made when they are printed."""
+"""Facts about a fit: kind, quantity, size, rows; the message is made when they are printed."""
 
 from dataclasses import dataclass, field
 

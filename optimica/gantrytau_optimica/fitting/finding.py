@@ -54,7 +54,7 @@ class Finding(Record):
         return "".join(map(str, self.parts))
 
     def in_lines(self, lines: np.ndarray) -> Self:
-        """The same with lines of a file, (N,) for all rows, in place of rows."""
+        """This finding with lines of a file, (N,) for all rows, in place of rows."""
         return replace(self, sentence=in_lines(self.parts, self.rows, lines))
 
     def __str__(self) -> str:

@@ -8,7 +8,7 @@ S scales the parameters so that their steps compare. Along directions with a sma
 do not determine stays where it began.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -31,11 +31,11 @@ MOVED = 0.1  # share of a parameter in a direction that data do not determine, f
 
 @dataclass(frozen=True)
 class Minimum(Record):
-    """Where least squares ended.
+    """Minimum of a sum of squares.
 
-    x: all parameters; residuals: (m,) there, those of the prior last; jacobian: (m, n) by the free parameters over their
-    scale; rank: how many directions are determined, the first; singular: values of the Jacobian along all; directions: the
-    rows that belong to them, (n, n); scale: of the free parameters, (n,); success: whether the last step was negligible.
+    x: all parameters; residuals: (m,), the rows of the prior last; jacobian: (m, n) by the free parameters over their
+    scale; singular: singular values of the Jacobian, (n,); directions: right singular vectors in rows, (n, n); rank: number
+    of determined directions, the first; scale: of the free parameters, (n,); success: whether the last step was negligible.
     """
 
     x: np.ndarray
@@ -54,7 +54,7 @@ class Minimum(Record):
         return float(self.residuals @ self.residuals)
 
     def noise(self, count: int) -> float:
-        """Standard deviation of one of so many measured residuals."""
+        """Standard deviation of a residual; count: number of measured residuals."""
         return float(np.sqrt(self.cost / max(1, count - self.rank)))
 
     @property
@@ -68,14 +68,14 @@ class Minimum(Record):
         return self.root.T @ self.root
 
     def beside(self, lost: np.ndarray) -> "Minimum":
-        """The same with directions (k, n) that were not moved, as ones that are not determined."""
+        """This minimum with further undetermined directions (k, n), which were not moved."""
         singular = np.concatenate([self.singular, np.linalg.norm(self.jacobian @ lost.T, axis=0)])
         return replace(self, singular=singular, directions=np.vstack([self.directions, lost]))
 
     def undetermined(self, names: Sequence[str], reported: np.ndarray | None = None) -> tuple[str, ...]:
-        """Names of the free parameters that take part in directions that are not determined.
+        """Names of the free parameters with a component in an undetermined direction.
 
-        reported: derivatives (n, n) of the parameters that are reported by those that were moved, None for the same.
+        reported: Jacobian (n, n) of the reported parameters by the fitted ones, None for the unit matrix.
         """
         lost = self.directions[self.rank :]
         part = np.abs(lost if reported is None else lost @ reported.T).max(axis=0, initial=0.0)
@@ -84,11 +84,17 @@ class Minimum(Record):
 
 @dataclass(frozen=True)
 class Prior(Record):
-    """Rows weight (x_i - value) of parameters by index; weights: the noise of a residual over standard deviations."""
+    """Rows weight (x_i - value) of parameters by index; weights: noise of a residual over their standard deviations."""
 
     indices: Sequence[int] | np.ndarray
     values: Sequence[float] | np.ndarray
     weights: Sequence[float] | np.ndarray
+
+    @classmethod
+    def of(cls, expected: Mapping[int, tuple[float, float]], noise: float) -> "Prior":
+        """Rows of parameters by index with (value, standard deviation); noise: standard deviation of a residual."""
+        values, deviations = [v for v, _ in expected.values()], [d for _, d in expected.values()]
+        return cls(list(expected), values, [noise / d for d in deviations])
 
 
 def least_squares(
@@ -104,10 +110,10 @@ def least_squares(
 ) -> Minimum:
     """Minimise |residuals(x)|^2 over the free parameters, beginning at x.
 
-    jacobian: (m, n) by all parameters; scale: of each parameter, in which steps are least, by default 1, 0 for one that is
-    fixed; priors: further rows. Directions in which the scaled Jacobian has a singular value below `smallest` (or 1e-10 of
-    the largest) are left alone. Steps that do not make the residuals smaller are halved. along: orthonormal rows (k, n) of
-    the only directions that are moved; steps: at most, 0 for the record of a minimum x that another solver found.
+    jacobian: (m, n) by all parameters; scale: of each parameter, by default 1, 0 for a fixed one; priors: further rows;
+    smallest: singular value of the scaled Jacobian, below which (or 1e-10 of the largest) a direction does not move; along:
+    orthonormal rows (k, n), the only directions to move in; steps: at most, 0 for the record of another solver's minimum
+    x. A step with larger residuals is halved.
     """
     problem = _Problem(residuals, jacobian, np.ones(len(x)) if scale is None else scale, priors)
     inside = np.eye(len(problem.scale)) if along is None else along
@@ -134,7 +140,7 @@ def least_squares(
 
 
 def limit_of(singular: np.ndarray, smallest: float) -> float:
-    """The singular value above which a direction is determined."""
+    """Smallest singular value of a determined direction."""
     return max(smallest, RELATIVE * float(singular.max(initial=0.0)))
 
 
@@ -171,9 +177,9 @@ def _shortened(problem: _Problem, x: np.ndarray, step: np.ndarray, cost: float):
 
 
 def _step(J: np.ndarray, e: np.ndarray, smallest: float, inside: np.ndarray):
-    """The step of least norm among those that make |e - J step| least, by the directions inside that count.
+    """Step of least norm among the minima of |e - J step|, along the determined directions inside.
 
-    With it what it would gain, singular values and directions, and J.
+    With its gain, singular values, directions and J.
     """
     if not np.isfinite(J).all() or not np.isfinite(e).all():
         return np.full(J.shape[1], np.nan), 0.0, np.zeros(len(inside)), inside, J

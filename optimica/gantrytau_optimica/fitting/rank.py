@@ -1,4 +1,4 @@
-"""Which parameters data tell apart, and the one sentence for those that they do not: `not_told_apart`.
+"""Identifiable combinations of parameters, and the one message for indistinguishable ones: `not_told_apart`.
 
     J P = Q [R11 R12; 0 0],  columns normed         p1 + R11^-1 R12 p2 is determined: base parameters (Gautier 1991)
     J S = U diag(s) V',  s_i = 0                    a change along S V_i moves no residual: the same from null directions
@@ -18,6 +18,7 @@ from scipy.linalg import qr, solve_triangular
 from scipy.sparse.csgraph import connected_components
 
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.linear import column_norms
 
 PIVOT = 1e-9  # of a normed column, below which what pivots leave of it is rounding
 EMPTY = 1e-13  # of the largest column, below which one is rounding throughout
@@ -33,11 +34,18 @@ SURE = 1e-3  # how closely a ratio of changes is to be a simple number
 
 
 def not_told_apart(names: Sequence[str], determined: Sequence[str]) -> str:
-    """The sentence on parameters that data do not tell apart; determined: combinations of them, none for no influence."""
+    """Message on indistinguishable parameters; determined: their identifiable combinations, none without influence."""
     if not determined:
         return f"nothing that was measured depends on {listed(names)}"
-    only = f"only {listed(determined)} {'is' if len(determined) == 1 else 'are'} determined"
-    return f"{listed(names)} cannot be told apart by these data: {only}"
+    verb = "is" if len(determined) == 1 else "are"
+    return f"{indistinguishable(names)}: only {listed(determined)} {verb} determined"
+
+
+def indistinguishable(names: Sequence[str]) -> str:
+    """Message on parameters of one null direction, without combinations; a single name has no influence."""
+    return (
+        f"{listed(names)} cannot be told apart by these data" if len(names) > 1 else not_told_apart(names, ())
+    )
 
 
 def listed(words: Sequence[str]) -> str:
@@ -47,7 +55,7 @@ def listed(words: Sequence[str]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters(Record):
-    """Base parameters: the columns that data determine, and how they contain the others.
+    """Base parameters: identifiable linear combinations of the columns of a Jacobian.
 
     independent: (i,) indices of the determined columns; dependent: (d,) indices of the others;
     shares: (i, d), the multiple of each dependent parameter within a base parameter.
@@ -58,7 +66,7 @@ class BaseParameters(Record):
     shares: np.ndarray
 
     def words(self, names: Sequence[str]) -> tuple[str, ...]:
-        """What is determined in place of parameters that cannot be told apart: `plate_mass + 0.5 link_masses[0]`."""
+        """Determined combinations of indistinguishable parameters: `plate_mass + 0.5 link_masses[0]`."""
         return tuple(
             self._sum(row, names) for row in range(len(self.independent)) if np.any(self.shares[row])
         )
@@ -68,7 +76,7 @@ class BaseParameters(Record):
         return tuple(names[int(d)] for k, d in enumerate(self.dependent) if not np.any(self.shares[:, k]))
 
     def messages(self, names: Sequence[str]) -> list[str]:
-        """A sentence for each group of parameters that are not told apart; first of all for those without influence."""
+        """Message for each group of indistinguishable parameters, parameters without influence first."""
         found = [not_told_apart(silent, ())] if (silent := self.silent(names)) else []
         linked = self.shares != 0
         _, group = connected_components(linked.T.astype(int) @ linked.astype(int), directed=False)
@@ -128,7 +136,7 @@ def base_of_directions(directions: np.ndarray, scale: np.ndarray) -> BaseParamet
 
 
 def dependencies(directions: np.ndarray, scale: np.ndarray, names: Sequence[str]) -> dict[str, list[str]]:
-    """Dependent parameters of null directions by name, each with the others that take up its change."""
+    """Dependent parameters of null directions by name, each with the parameters collinear with it."""
     base = base_of_directions(directions, scale)
     return {
         names[int(d)]: [names[int(i)] for i in base.independent[column != 0]]
@@ -144,19 +152,19 @@ class LocalJacobian:
     values: np.ndarray
 
     def of(self, some: Sequence[int]) -> "LocalJacobian":
-        """That of some parameters."""
+        """Jacobian and values of some parameters."""
         return LocalJacobian(self.jacobian[:, some], self.values[some])
 
 
 def without_influence(point: LocalJacobian, sizes: np.ndarray) -> list[int]:
-    """Indices of the parameters that no residual depends on; residuals by the size of what was measured."""
+    """Indices of parameters without influence on any residual; residuals over the size of the measured values."""
     moved = np.linalg.norm(point.jacobian * sizes, axis=0)
     return np.flatnonzero(moved <= SILENT * max(1.0, np.max(moved, initial=0.0))).tolist()
 
 
 @dataclass(frozen=True, eq=False)
 class NullSpace:
-    """Combined changes (k, d) of the parameters by their sizes that move no residual; resolved: whether that is sure."""
+    """Null space: changes (k, d) of the parameters over their sizes without effect on a residual; resolved: whether sure."""
 
     changes: np.ndarray
     resolved: bool
@@ -165,14 +173,13 @@ class NullSpace:
 def null_space(
     point: LocalJacobian, sizes: np.ndarray, finer: LocalJacobian | None = None, rounding: float = ROUNDING
 ) -> NullSpace:
-    """What no residual notices; finer: Jacobian on a finer mesh, which differs where the mesh is too coarse to tell;
+    """Null space of the Jacobian; finer: Jacobian on a finer mesh, which differs where the mesh is too coarse;
     rounding: without it, what counts as zero.
 
     A small singular value is one of rounding, and its vector null, if the finer mesh does not confirm what it moves.
     """
     columns = point.jacobian * sizes
-    norms = np.linalg.norm(columns, axis=0)
-    norms = np.where(norms > 0, norms, 1.0)
+    norms = column_norms(columns)
     columns = columns / norms
     _, singular, right = np.linalg.svd(columns, full_matrices=False)
     null, resolved = [], True
@@ -198,7 +205,7 @@ def local_messages(
     finer: LocalJacobian | None,
     elsewhere: Callable[[], LocalJacobian | None],
 ) -> list[str]:
-    """A sentence for each group that a nonlinear fit does not tell apart; elsewhere: the Jacobian at another point."""
+    """Message for each indistinguishable group of a nonlinear fit; elsewhere: the Jacobian at another point."""
     changes = _sparse_changes(point, sizes, null_space(point, sizes, finer).changes)
     if not changes:
         return []
@@ -218,7 +225,7 @@ def local_messages(
 def _sparse_changes(
     point: LocalJacobian, sizes: np.ndarray, null: np.ndarray
 ) -> dict[tuple[int, ...], np.ndarray]:
-    """Changes that span the same as `null` (k, d), each of as few parameters as possible: by the indices of these."""
+    """Sparse basis of the span of `null` (k, d), each vector by the indices of its parameters."""
     if not null.shape[1]:
         return {}
     norms = np.linalg.norm(point.jacobian * sizes, axis=0)
@@ -231,7 +238,7 @@ def _sparse_changes(
 
 
 def _law(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> list[str]:
-    """What stays the same under changes of these parameters, as far as it is simple; points: changes and values."""
+    """Simple invariants of changes of these parameters; points: changes and values."""
     if len(names) == 2:
         return [law] if (law := _pair(names, points)) else []
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -241,14 +248,14 @@ def _law(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> list[
 
 
 def _to_first_order(names: list[str], change: np.ndarray) -> list[str]:
-    """Sums that stay the same under small changes."""
+    """Sums invariant under small changes."""
     others = np.arange(len(names) - 1)
     base = BaseParameters(others, others[-1:] + 1, -(change[:-1] / change[-1])[:, None])
     return [f"{one} (to first order)" for one in base.words(names)]
 
 
 def _pair(names: list[str], points: list[tuple[np.ndarray, np.ndarray]]) -> str:
-    """The ratio, product, difference or sum of two that is determined; "" if it is none of these."""
+    """Determined ratio, product, difference or sum of two parameters; "" for none of these."""
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.array([(c / v)[1] / (c / v)[0] for c, v in points])  # d ln b / d ln a
         absolute = np.array([c[1] / c[0] for c, _ in points])

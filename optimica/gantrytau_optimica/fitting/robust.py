@@ -1,4 +1,4 @@
-"""Sizes of residuals that strays do not move, and weights that strays lose.
+"""Robust standard deviations of residuals, and weights of strays.
 
 s = 1.4826 median |e|          standard deviation of e where noise is normal (Huber, 1981)
 Huber   w = min(1, k / |u|)    u = e / s; the weight of u^2, linear beyond k
@@ -15,34 +15,34 @@ HUBER, BISQUARE = 1.345, 4.685  # deviations k and c: 95 % as efficient as squar
 
 
 def limit(freedom: float) -> float:
-    """How many robust standard deviations noise does not reach, where `freedom` errors showed it."""
+    """Limit of noise in robust standard deviations, these estimated with `freedom` degrees of freedom."""
     from scipy.special import stdtrit
 
     return max(OUTLIER, float(stdtrit(max(1.0, freedom), 1.0 - CHANCE)))
 
 
 def robust_deviation(left: np.ndarray, taken: int = 0) -> float:
-    """Standard deviation of what is left (N,) by the median of its amounts; taken: numbers that were fitted to it."""
+    """Standard deviation of residuals (N,) by the median of their amounts; taken: number of fitted parameters."""
     return NORMAL * float(np.median(np.abs(left))) * float(np.sqrt(len(left) / max(len(left) - taken, 1)))
 
 
 def robust_deviations(left: np.ndarray, axis: int = 0) -> np.ndarray:
-    """The same along an axis of an array."""
+    """Robust standard deviations along an axis of an array."""
     return NORMAL * np.median(np.abs(left), axis=axis)
 
 
 def huber_weights(sizes: np.ndarray, beyond: float = HUBER) -> np.ndarray:
-    """Weights of squares, at most 1, of residuals of such sizes in deviations."""
+    """Huber's weights of squares, at most 1; sizes: residuals over their standard deviation."""
     return np.minimum(1.0, beyond / np.maximum(np.abs(sizes), 1e-300))
 
 
 def tukey_roots(sizes: np.ndarray) -> np.ndarray:
-    """Roots of Tukey's weights, the factors of residuals of such sizes in deviations."""
+    """Roots of Tukey's weights, factors of residuals; sizes: residuals over their standard deviation."""
     return np.maximum(1 - (sizes / BISQUARE) ** 2, 0.0)
 
 
 def without_strays(left: np.ndarray, jacobian: np.ndarray) -> np.ndarray:
-    """What a fit that strays do not lead would leave (N,), from what least squares leave (N,) and their Jacobian (N, k).
+    """Residuals (N,) of a robust fit, from the residuals (N,) of least squares and their Jacobian (N, k).
 
     Tukey's bisquare from the median of the amounts, to first order.
     """

@@ -32,7 +32,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationVerdict(Record, Verdict):
-    """Of a measured calibration.
+    """Verdict on a measured calibration.
 
     validation_error: mean error of poses that were not fitted, m, NaN where there are none; expected_error: of the tool, in
     the mean over the places where it is to work, m.

@@ -19,7 +19,7 @@ NOT_A_ROTATION = 1e-3  # of R' R - I; instruments give six decimals
 def check_data(
     q: np.ndarray, r: np.ndarray, R: np.ndarray | None, finite: np.ndarray, rails: Sequence[np.ndarray] | None
 ) -> tuple[Finding, ...]:
-    """What is doubtful in measurements q (N, n), r (N, 3), R (N, 3, 3), of which the rows `finite` (N,) are numbers."""
+    """Findings in measurements q (N, n), r (N, 3), R (N, 3, 3); finite: mask (N,) of the finite rows."""
     rows = np.arange(len(q)) if finite.all() else np.flatnonzero(finite)
     if len(rows) < len(q):
         q, r, R = q[rows], r[rows], None if R is None else R[rows]

@@ -30,7 +30,7 @@ class CalibrationError(GantryTauError):
         self.findings = tuple(findings)
 
     def in_lines(self, lines: np.ndarray) -> Self:
-        """The same with lines of a file, (N,) for all rows, in place of rows."""
+        """This finding with lines of a file, (N,) for all rows, in place of rows."""
         found = copy(self)
         found.parts = cast(Any, tuple(in_lines(self.parts, self.rows, lines)))
         return found

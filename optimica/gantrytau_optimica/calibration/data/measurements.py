@@ -117,7 +117,7 @@ class Measurements(Record):
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is doubtful in these numbers, whatever the robot: kinds "nan", "duplicates", "stuck", "too few poses",
+        """Findings in these measurements, whatever the robot: kinds "nan", "duplicates", "stuck", "too few poses",
         "line", "plane", "millimetres", "rotations", "guideway".
         """
         return check_data(self.q, self.r, self.R, self.finite, self.rails)

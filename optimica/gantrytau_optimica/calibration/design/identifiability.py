@@ -1,11 +1,10 @@
-"""Which parameters measured poses determine, and which follow from others.
+"""Which parameters measured poses determine, and which they cannot tell apart.
 
     J S = U diag(s) V'      s_i = 0: no pose tells anything in the direction V_i;
                             s_i < noise / tape: less than a tape measure
 
-J stacks the closure errors of all links of an arm at all poses. Of the directions with s_i = 0 each is written with one
-redundant parameter, the last one that takes part in it, as a combination of it and its dependent ones. Dressler (2012),
-section 5.4 and Table 5.4.
+J: Jacobian of the closure errors of all links of an arm at all poses. Each null direction, s_i = 0, is named by one
+redundant parameter, its last, and by the parameters collinear with it. Dressler (2012), section 5.4 and Table 5.4.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,13 +26,13 @@ from gantrytau_optimica.calibration.links.arm_factors import (
 )
 from gantrytau_optimica.calibration.links.arm_poses import pose_rows
 from gantrytau_optimica.calibration.links.groups import TAPE
-from gantrytau_optimica.fitting.rank import dependencies
+from gantrytau_optimica.fitting.rank import dependencies, indistinguishable
 
 NOTHING = 1e-9  # of the largest singular value: rounding leaves 1e-14, the weakest of the F1 is 1e-4
 
 
 class PoseArrays(NamedTuple):
-    """What was measured: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
+    """Measured poses: actuator positions (N, n), positions (N, 3) in m, orientations (N, 3, 3) or None."""
 
     q: np.ndarray
     r: np.ndarray
@@ -42,12 +41,11 @@ class PoseArrays(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ArmIdentifiability(Record):
-    """What poses say about the parameters of one arm.
+    """Rank of the Jacobian of one arm, with its redundant parameters.
 
-    name: its path; names: of its unknowns; count: how many; rank: directions that the poses determine at all;
-    deficiency: count - rank; redundant: parameters that may be fixed, each with those that take up its change;
-    collinear: directions that are determined worse than by a tape measure, in the same form;
-    singular_values: of J S, descending, (count,), S as in `arm_fit`.
+    name: path of the arm; names: its parameters, `count` of them; rank: of the Jacobian; deficiency: count - rank;
+    redundant: parameters to fix, each with the parameters collinear with it; collinear: the same for directions with
+    a larger standard deviation than a tape measure has; singular_values: of J S, descending, (count,), S as in `fit_arm`.
     """
 
     name: str
@@ -58,14 +56,14 @@ class ArmIdentifiability(Record):
     redundant: Mapping[str, list[str]]
     collinear: Mapping[str, list[str]]
     singular_values: np.ndarray
-    _half: np.ndarray = field(repr=False)  # half of the covariance in the directions that are held
+    _half: np.ndarray = field(repr=False)  # root of the covariance, in the determined directions
     _directions: np.ndarray = field(repr=False)  # (count, count), rows as singular_values
-    _held: np.ndarray = field(repr=False)  # which of them are known better than by a tape measure
+    _held: np.ndarray = field(repr=False)  # directions known better than by a tape measure
 
     def covariance(self, names: Sequence[str]) -> np.ndarray:
-        """Covariance of parameters as these poses determine them, (k, k); names of vectors or of their elements.
+        """Covariance (k, k) of parameters, names being those of vectors or of their elements.
 
-        Raises ModelError for unknown names, StructureError for what the data do not hold, with the group it is in.
+        Raises ModelError for unknown names, StructureError for undetermined parameters, with the group of each.
         """
         rows = [k for name in names for k in self._rows(name)]
         lost = np.abs(self._directions[~self._held][:, rows]).max(axis=0, initial=0.0)
@@ -90,8 +88,8 @@ class ArmIdentifiability(Record):
         inside = [(r, g) for r, g in groups if name == r or name in g]
         if inside:
             redundant, group = inside[0]
-            others = ", ".join([*group, redundant])
-            return f"{name}: these poses determine only a combination of {others}; fix {redundant}, or give a prior for it"
+            together = indistinguishable([*group, redundant])
+            return f"{name}: {together}; fix {redundant}, or give a prior for it"
         fixed = ", ".join(redundant for redundant, _ in groups)
         return (
             f"{name}: these poses do not determine it alone, expected {fixed} to be fixed or to have priors"
@@ -99,7 +97,10 @@ class ArmIdentifiability(Record):
 
     def __str__(self) -> str:
         lines = [f"{self.name}: {self.count} parameters, rank {self.rank}"]
-        lines += [f"  {name} follows from {', '.join(others)}" for name, others in self.redundant.items()]
+        lines += [
+            f"  {indistinguishable([*others, name])}: {name} may be fixed"
+            for name, others in self.redundant.items()
+        ]
         lines += [
             f"  {name} is known worse than by a tape measure"
             + (f", with {', '.join(others)}" if others else "")
@@ -110,7 +111,7 @@ class ArmIdentifiability(Record):
 
 @dataclass(frozen=True, eq=False)
 class Identifiability(Record):
-    """What measured poses say about a robot: `arms[i]`; prints itself."""
+    """Ranks and redundant parameters of the arms of a robot, `arms[i]`; prints itself."""
 
     arms: tuple[ArmIdentifiability, ...]
 
@@ -128,12 +129,11 @@ def identifiability(
     angle: float = 0.0,
     tape: float = TAPE,
 ) -> Identifiability:
-    """Which parameters of a robot measured poses determine, at the parameters of the model.
+    """Which parameters of a robot measured poses determine, by the Jacobian at the parameters of the model.
 
-    measurements: a record with q, r and R, or (q, r) or (q, r, R); orientation: of turntables, "local", "unit" or "free"
-    as in `arms`; gains: with the gains of turntables; noise, angle: standard deviations of the measured pose per axis, in
-    m and rad; tape: of what is known before, in m. Rows that are not finite, as of poses that a device did not see, count
-    for nothing.
+    measurements: a record with q, r and R, or (q, r) or (q, r, R), whose rows with NaN are left out; orientation:
+    parameters of turntables, "local", "unit" or "free" as in `read_arms`; gains: with the gains of turntables; noise,
+    angle: standard deviations of the measured pose per axis, in m and rad; tape: standard deviation of a tape measure, m.
     Raises ModelError for another robot, or for arrays that do not fit.
     """
     check_words(identifiability, locals())

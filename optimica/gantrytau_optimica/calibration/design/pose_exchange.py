@@ -24,7 +24,7 @@ GAIN = 1e-5  # of each unknown's deviation, that an exchange must be worth: of t
 def exchanged(
     blocks: Sequence[np.ndarray], chosen: np.ndarray, weights: Sequence[np.ndarray], slack: float | None
 ) -> np.ndarray:
-    """Rows, ascending, that are better than those chosen, as many.
+    """Rows, ascending, better than the chosen ones, as many.
 
     blocks: J of each arm, (N, m, p); weights: W of each, (p, p). slack: None for the criterion "tool"; else D-optimal, and
     then for the tool as long as no more than slack of log det is lost for each unknown.

@@ -57,7 +57,7 @@ class PoseSensitivities(Record):
 
     @property
     def sizes(self) -> np.ndarray:
-        """How far a unit of each parameter moves the tool, (N, p)."""
+        """Displacement of the tool by a unit of each parameter, (N, p)."""
         return np.linalg.norm(self.position, axis=1)
 
     @property

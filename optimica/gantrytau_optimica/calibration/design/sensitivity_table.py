@@ -62,7 +62,7 @@ class SensitivityTable(Record):
 def sensitivity_table(
     robot: Model, measurements: Any, *, step: float = STEP, orientation: Orientation = "local"
 ) -> SensitivityTable:
-    """What a step of each parameter either way does to poses and costs, summed over poses.
+    """Changes of poses and costs by a step of each parameter either way, summed over poses.
 
     measurements: a record with q, r and R, or a tuple of them; the poses proper follow from q, near r and R. orientation:
     of turntables, as in `arms`. Rows that are not finite count for nothing.

@@ -26,7 +26,7 @@ ORTHONORMAL = 1e-6  # what rounding to six decimals leaves of a rotation matrix
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPoses(Record):
-    """What a device read at N poses; rows that it did not see are NaN.
+    """Readings of a device at N poses; unseen rows are NaN.
 
     r: positions (N, 3) in m, or None if the device finds none; R: orientations (N, 3, 3), or None; readings: (N, k) as
     the device delivers them, their names and units in `names`; seen: (N,) whether the device saw the target.
@@ -89,7 +89,7 @@ class Device(Record):
         frame: Literal["world", "device"] = "world",
         bars: Bars | None = None,
     ) -> MeasuredPoses:
-        """What the device reads of a tool at r (N, 3) in m with orientations R (N, 3, 3), default no rotation.
+        """Readings of a tool at r (N, 3) in m with orientations R (N, 3, 3), default no rotation.
 
         seed: of the noise; the same seed gives the same noise. frame: in which positions and orientations are given,
         the world or the axes of the device, which is what devices deliver. bars: links that may hide the target.

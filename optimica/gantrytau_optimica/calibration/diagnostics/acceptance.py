@@ -191,7 +191,7 @@ def not_in_base(robot: NominalRods, fitting: Fitting, rows: np.ndarray) -> Calib
 
 
 def judged(found: FittedRods) -> list[Finding]:
-    """What is doubtful after a fit: rows with mistakes, outliers, slips, and numbers that data do not hold.
+    """Findings after a fit: rows with mistakes, outliers, slips, and undetermined parameters.
 
     CalibrationError for rows whose columns are swapped or in mm, unless a robust loss left them without weight, and for
     measurements that no parameters explain.

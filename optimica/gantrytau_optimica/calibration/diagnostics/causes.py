@@ -1,4 +1,4 @@
-"""What may have led a fit astray, in words: changes over the rows, priors and limits, a scale."""
+"""Causes of large residuals, as messages: changes over the rows, priors and limits, a scale."""
 
 from collections.abc import Iterator
 
@@ -30,7 +30,7 @@ ORDINALS = ("", "", "second", "third", "fourth", "fifth", "sixth")
 
 
 def over_rows(found: FittedRods) -> Iterator[Finding]:
-    """What changed from one row on, with the order of the rows, or from row to row."""
+    """Changes over the rows: from one row on, with the order of the rows, or from row to row."""
     if found.measurements.shared is not None:  # such errors follow the order of the places
         return
     used, systems = found.systems(LOOKED_AT)

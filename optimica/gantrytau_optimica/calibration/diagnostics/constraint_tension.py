@@ -35,7 +35,7 @@ class Pull:
 
 
 def pulls(fit: Fit, constraints: Sequence[ParameterConstraint] = ()) -> list[Pull]:
-    """What holds numbers of a fit against the data, the strongest first; limits that are reached in any case."""
+    """Priors and constraints against the data, the strongest first; reached limits in any case."""
     names, free = fit.free_names, np.flatnonzero(fit.group.free)
     if not fit.group.prior and not constraints:
         return []

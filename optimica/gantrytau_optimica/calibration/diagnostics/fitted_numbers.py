@@ -53,7 +53,7 @@ class FittedNumbers(Record):
     @property
     @abstractmethod
     def robot_name(self) -> str:
-        """What the robot is called."""
+        """Name of the robot."""
 
     @property
     @abstractmethod
@@ -78,7 +78,7 @@ class FittedNumbers(Record):
     @property
     @abstractmethod
     def advice(self) -> str:
-        """What to do about numbers that data do not hold."""
+        """Remedy for undetermined parameters."""
 
     @cached_property
     @abstractmethod
@@ -105,7 +105,7 @@ class FittedNumbers(Record):
 
     @property
     def rank(self) -> int:
-        """How many combinations of the identified numbers data hold."""
+        """Rank: the number of determined combinations of the identified parameters."""
         return sum(minimum.rank for minimum in self.minima)
 
     @property
@@ -185,7 +185,7 @@ class FittedNumbers(Record):
         return diagnose(series, remedies=REMEDIES)
 
     def with_findings(self, findings: Sequence[Finding]) -> Self:
-        """The same with other findings, without working anything out anew."""
+        """This calibration with other findings, without a new fit."""
         return self._kept(replace(self, findings=tuple(findings)), "findings")
 
     def _kept(self, found: Self, *others: str) -> Self:

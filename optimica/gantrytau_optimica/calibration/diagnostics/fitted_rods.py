@@ -1,4 +1,4 @@
-"""What a fit of rods found: parameters, how sure they are, and how well they predict poses that were held out."""
+"""Calibration of robots on rods: parameters, standard deviations, errors at held-out poses."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -63,7 +63,7 @@ class FittedRods(FittedNumbers):
         return replace(self, fits=self.suspicion.fits, rows=rows, held_out=held_out)
 
     def measured_by(self, motion: Motion) -> Self:
-        """The same of measurements that a motion laid into their frame."""
+        """This calibration of measurements moved into their frame."""
         return self._kept(replace(self, motion=motion), "motion", "parameters")
 
     @cached_property
@@ -89,7 +89,7 @@ class FittedRods(FittedNumbers):
 
     @property
     def nominal_values(self) -> Mapping[str, Any]:
-        """What parameters were before."""
+        """Nominal values of the parameters."""
         return self.nominal_rods.values
 
     @property
@@ -108,7 +108,7 @@ class FittedRods(FittedNumbers):
 
     @property
     def minima(self) -> tuple[Minimum, ...]:
-        """Those of the fits."""
+        """Minima of the fits."""
         return tuple(fit.minimum for fit in self.fits)
 
     def undetermined_part(self, name: str) -> bool:

@@ -47,16 +47,16 @@ class LinkSystem(Record):
 
     @cached_property
     def left(self) -> np.ndarray:
-        """What numbers leave of the errors, (N, m)."""
+        """Residuals of the errors after the fit of the parameters, (N, m)."""
         return self.across(self.errors[..., None])[..., 0]
 
     def across(self, columns: np.ndarray) -> np.ndarray:
-        """What numbers leave of columns (N, m, k)."""
+        """Residuals of columns (N, m, k) after the fit of the parameters."""
         flat = columns.reshape(self.errors.size, -1)
         return (flat - self.known @ (self.known.T @ flat)).reshape(columns.shape)
 
     def with_columns(self, columns: np.ndarray) -> "LinkSystem":
-        """The same where further columns (N, m, k) explain errors as numbers do."""
+        """This system with further columns (N, m, k) as parameters."""
         return replace(self, numbers=np.concatenate([self.numbers, columns], axis=2))
 
 
@@ -92,12 +92,12 @@ def freedom(systems: Sequence[LinkSystem]) -> int:
 
 
 def variance(systems: Sequence[LinkSystem]) -> float:
-    """Of a closure error that numbers leave, m2."""
+    """Variance of the residual closure errors, m2."""
     return sum(float(np.sum(one.left**2)) for one in systems) / max(1, freedom(systems))
 
 
 def with_smooth(systems: Sequence[LinkSystem], r: np.ndarray) -> list[LinkSystem]:
-    """The same where polynomials of the third degree in r (N, 3) explain errors of each link too, as errors of the model."""
+    """This system with polynomials of the third degree in r (N, 3) for each link, as errors of the model."""
     x = 2 * (r - r.min(axis=0)) / np.maximum(np.ptp(r, axis=0), 1e-300) - 1
     x = np.column_stack([np.ones(len(x)), x])
     smooth = np.column_stack(

@@ -163,7 +163,7 @@ def _moved(
 
 
 def _of_prior(fit: Fit) -> np.ndarray:
-    """What the rows of the prior, the last of the Jacobian, add to J'e, in columns."""
+    """Contributions of the rows of the prior, the last of the Jacobian, to J'e, in columns."""
     count = len(fit.group.prior)
     rows = fit.minimum.jacobian[len(fit.minimum.jacobian) - count :] / fit.minimum.scale
     return rows.T * fit.minimum.noise(fit.count)

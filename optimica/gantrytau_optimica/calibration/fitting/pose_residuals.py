@@ -1,4 +1,4 @@
-"""What measured poses leave of a robot whose parameters have names, and least squares of it.
+"""Pose residuals of a robot by named parameters, and their least squares.
 
     e = exp([w]x) R0 m + t - r(q, p)       of places m, in the base of the robot
     a = vector(exp([w]x) R0 M R(q, p)')    of orientations M, by a lever as long as noise of places is to that of turns
@@ -18,7 +18,7 @@ from gantrytau.kinematics.rotations import left_jacobian, motion, of_vector, rot
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.fitting.tool_function import ToolFunction, tool_function
 from gantrytau_optimica.calibration.links.arm_factors import LEVER
-from gantrytau_optimica.calibration.links.groups import TAPE
+from gantrytau_optimica.calibration.links.groups import TAPE, tape_limit
 from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squares
 from gantrytau_optimica.fitting.robust import (
     OUTLIER,
@@ -37,8 +37,10 @@ LEAST = 1e-12  # m, of the noise: rounding of places of metres
 
 @dataclass(frozen=True, eq=False)
 class PoseResiduals(Record):
-    """tool: of the robot; data: measured poses, all finite; turn: R0 (3, 3), or None where poses are in the base; lever: of
-    turns, m; weights: of poses, (N,); prior: value and deviation by the place of a number in x.
+    """Residuals of measured poses by named parameters x.
+
+    tool: of the robot; data: measured poses, all finite; turn: R0 (3, 3), or None for poses in the base; lever: of
+    rotations, m; weights: of poses, (N,); prior: value and standard deviation by index in x.
     """
 
     tool: ToolFunction
@@ -50,12 +52,12 @@ class PoseResiduals(Record):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the parameters x."""
+        """Names of the parameters x."""
         return self.tool.names if self.turn is None else (*FRAME, *self.tool.names)
 
     @property
     def scale(self) -> Array:
-        """What of each number moves the tool by about a metre."""
+        """Scale of each parameter: change for a metre at the tool, about."""
         return (
             self.tool.scale
             if self.turn is None
@@ -69,7 +71,7 @@ class PoseResiduals(Record):
         return of_vector(x[:3]) @ self.turn, x[3:6], x[6:]
 
     def poses(self, x: Array) -> Array:
-        """E and a of each pose, (N, 3 or 6), without weights."""
+        """Residuals e and a of each pose, (N, 3 or 6), without weights."""
         R, t, p = self.frame(x)
         r, turned = self.tool(self.data.q, p)
         e = self.data.r @ R.T + t - r
@@ -78,7 +80,7 @@ class PoseResiduals(Record):
         return np.hstack([e, self.lever * rotation_vector(R @ self.data.R @ np.swapaxes(turned, 1, 2))])
 
     def jacobian(self, x: Array) -> Array:
-        """Their derivatives by x, (N, 3 or 6, n)."""
+        """Jacobian of e and a by x, (N, 3 or 6, n)."""
         R, _, p = self.frame(x)
         units = np.repeat([1.0, self.lever], 3)[: 6 if self.tool.turning else 3]
         found = -self.tool.jacobian(self.data.q, p) * units[:, None]
@@ -93,24 +95,22 @@ class PoseResiduals(Record):
         return np.concatenate([by_frame, found], axis=2)
 
     def minimum(self, x: Array, noise: float) -> Minimum:
-        """Least squares from x; what poses tell less of than a tape measure stays there, by the noise, m."""
-        held = self.prior.values()
-        prior = Prior(list(self.prior), [m for m, _ in held], [noise / deviation for _, deviation in held])
+        """Least squares from x; noise: m, directions known worse than by a tape measure do not move."""
         return least_squares(
             lambda x: (self.poses(x) * self.weights[:, None]).ravel(),
             self.weighted_jacobian,
             x,
             scale=self.scale,
-            priors=[prior],
-            smallest=noise / TAPE * (1 - 1e-6),
+            priors=[Prior.of(self.prior, noise)],
+            smallest=tape_limit(noise),
         )
 
     def weighted_jacobian(self, x: Array) -> Array:
-        """Derivatives of all weighted residuals, (m, n)."""
+        """Jacobian of all weighted residuals, (m, n)."""
         return (self.jacobian(x) * self.weights[:, None, None]).reshape(-1, len(x))
 
     def robust(self, x: Array) -> tuple[Array, float, float]:
-        """What a fit that strays do not lead would leave, (N, 3 or 6) by its weights, and deviations of places and turns."""
+        """Weighted residuals (N, 3 or 6) of a robust fit, and standard deviations of positions and rotations."""
         J = self.weighted_jacobian(x) * self.scale
         left = (self.poses(x) * self.weights[:, None]).ravel()
         used = np.repeat(self.weights > 0, len(left) // len(self.weights))
@@ -123,7 +123,7 @@ class PoseResiduals(Record):
 
 
 def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseResiduals, Array]:
-    """The residuals and where their parameters begin: nominal values, in the frame in which these fit best."""
+    """Residuals and start values: nominal parameters, in the frame of their best fit."""
     sure = np.ones(len(data)) if data.certainty is None else data.certainty
     if not framed:
         return PoseResiduals(tool, data, None, LEVER, sure, {}), tool.nominal
@@ -138,7 +138,7 @@ def started(tool: ToolFunction, data: Measurements, framed: bool) -> tuple[PoseR
 def named_jacobian(
     robot: Model, parameters: Sequence[str], joints: Sequence[str] | None, poses: Any
 ) -> Array:
-    """Slopes of poses (q, r, R) by named parameters and a frame, (N, 3 or 6, n), each number by what moves a metre."""
+    """Jacobian of poses (q, r, R) by named parameters and a frame over their scales, (N, 3 or 6, n)."""
     q, r, R = poses
     tool = tool_function(robot, parameters, joints, R is not None)
     residuals, x = started(tool, Measurements(q, r, R), True)
@@ -146,7 +146,7 @@ def named_jacobian(
 
 
 def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResiduals, Minimum, float]:
-    """The least squares where noise, the lever of turns and, of a robust loss, Tukey's weights have settled."""
+    """Least squares with converged noise, lever of rotations and, for a robust loss, Tukey's weights."""
     sure, noise, begin = residuals.weights, 0.0, x
     minimum = residuals.minimum(x, noise)
     for _ in range(ROUNDS):
@@ -170,7 +170,7 @@ def fitted(residuals: PoseResiduals, x: Array, robust: bool) -> tuple[PoseResidu
 
 
 def strays(residuals: PoseResiduals, x: Array) -> Array:
-    """Places of poses that are off by more than noise explains."""
+    """Indices of poses with larger residuals than noise explains."""
     sure = residuals.data.certainty
     every = replace(residuals, weights=np.ones(len(residuals.data)) if sure is None else sure)
     left, noise, turned = every.robust(x)

@@ -1,4 +1,4 @@
-"""What is expected of parameters before they are fitted, as `calibrate(..., prior=...)` says it."""
+"""Prior of parameters, as `calibrate(..., prior=...)` takes it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Groups of links brought to their minima: truncation of what data do not hold, robust weights."""
+"""Least squares of groups of links: truncation of undetermined directions, robust weights."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.describing.record import Record
-from gantrytau_optimica.calibration.links.groups import Group
+from gantrytau_optimica.calibration.links.groups import Group, tape_limit
 from gantrytau_optimica.fitting.least_squares import Minimum, Prior, limit_of
 from gantrytau_optimica.fitting.robust import (
     huber_weights,
@@ -60,7 +60,7 @@ class Fit(Record):
 
     @property
     def smallest(self) -> float:
-        """The singular value below which directions of a like group are held worse than by a tape measure."""
+        """Singular value below which a direction is known worse than by a tape measure."""
         return self.noise / self.group.tape
 
     def distances(self) -> np.ndarray:
@@ -75,7 +75,7 @@ def fit_group(
     begin: np.ndarray | None = None,
     smallest: float | None = None,
 ) -> Fit:
-    """The minimum of a group; what data hold worse than a tape measure stays near the start values.
+    """Minimum of a group; directions known worse than by a tape measure stay near the start values.
 
     weights: of the poses, (N,), or None; begin: where the search begins, instead of the start values; smallest: singular
     value below which directions are known not to be held.
@@ -87,7 +87,7 @@ def fit_group(
     """
     x, rows = group.x if begin is None else begin, group.condensed(weights)
     if group.noise is not None and smallest is None:
-        limit = group.noise / group.tape * (1 - 1e-6)  # a prior as wide as a tape measure counts
+        limit = tape_limit(group.noise, group.tape)
         return Fit(group, rows.minimum(x, group.noise, smallest=limit), weights)
     if smallest is None:
         minimum, noise = rows.minimum(x, 0.0), 0.0

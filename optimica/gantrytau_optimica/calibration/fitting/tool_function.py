@@ -32,7 +32,7 @@ class ToolFunction(Record):
 
     @cached_property
     def scale(self) -> Array:
-        """What of each parameter moves a tool by about a metre, (k,)."""
+        """Scale of each parameter: change for a metre at the tool, about, (k,)."""
         units = [self._unit(name) for name in self.names]
         known = {"m": 1.0, "rad": 1 / LEVER}
         return np.array([known.get(u, max(abs(x), 1.0)) for u, x in zip(units, self.nominal, strict=True)])

@@ -18,7 +18,7 @@ BLOCK = 1024  # poses; Jacobians of 38 columns for them take 1 MB
 
 
 def scales(arm: ArmClosure) -> np.ndarray:
-    """What of each unknown moves a joint by a metre, (p,)."""
+    """Scale of each parameter: change for a metre at a joint, (p,)."""
     turning = [".rotation[" in name or ".gain" in name for name in arm.names]
     quaternion = [".orientation[" in name for name in arm.names]
     return np.where(turning, 1 / LEVER, np.where(quaternion, 0.5 / LEVER, 1.0))

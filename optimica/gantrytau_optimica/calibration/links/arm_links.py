@@ -1,12 +1,13 @@
-"""Links of an arm on turntables over the measured poses, by all unknowns of the arm: what `Chain` is without turntables."""
+"""Links of an arm on turntables over the measured poses, by all parameters of the arm; `Chain` has no turntables."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.rotations import left_jacobian
 from gantrytau_optimica.calibration.links.arm_closure import ArmClosure
+from gantrytau_optimica.calibration.links.closure import by_motion
 
 STEP = 1e-5  # m or rad, of differences by an actuator
 
@@ -39,7 +40,7 @@ class ArmOverPoses:
         return self._known[1:]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of rotations from where the arm is by those from where it was, (p, p); None for the same.
+        """Jacobian (p, p) of rotations from the moved arm by rotations from its start; None for the unit matrix.
 
         exp([d + dd]x) = exp([d]x) exp([J(d)' dd]x) with the Jacobian J of the left.
         """
@@ -108,18 +109,12 @@ class ArmLink(Record):
     def by_pose(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """de/dT and de/dphi, (N, 3) each."""
         arm, here = self.poses.moved(p), self.poses
-        u = arm.directions(here.q, here.r, here.R)[:, self.j]
-        if here.R is None:
-            return u, np.zeros_like(u)
-        return u, np.cross(here.R @ arm.vector_of(arm.said.rods[self.j].plate_offset), u)
+        offset = None if here.R is None else arm.vector_of(arm.said.rods[self.j].plate_offset)
+        return by_motion(arm.directions(here.q, here.r, here.R)[:, self.j], here.R, offset)
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the parameters that are reported by those that are moved; None for the same."""
+        """Jacobian of the reported parameters by the fitted ones; None for the unit matrix."""
         return self.poses.told(p)
-
-    def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "ArmLink":
-        """The link over other poses."""
-        return replace(self, poses=ArmOverPoses(self.poses.arm, q, r, R))
 
 
 def links_of(arm: ArmClosure, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> list[ArmLink]:

@@ -84,8 +84,7 @@ class Chain(Record):
 
     def by_pose(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """de/dT and de/dphi, phi a rotation vector in the world, (N, 3) each; zero where the plate does not turn."""
-        u = 2 * self.vector(p)
-        return u, np.zeros_like(u) if self.R is None else np.cross(self.R @ p[PLATE], u)
+        return by_motion(2 * self.vector(p), self.R, p[PLATE])
 
     def distance(self, p: np.ndarray) -> np.ndarray:
         """The error as a difference of lengths, about e / 2L, (N,) in m."""
@@ -96,10 +95,10 @@ class Chain(Record):
         return np.linalg.norm(self.vector(p), axis=1) - p[0]
 
     def told(self, p: np.ndarray) -> np.ndarray | None:
-        """Derivatives of the parameters that are reported by those that are moved, (size, size), None for the same.
+        """Jacobian (size, size) of the reported parameters by the fitted ones, None for the unit matrix.
 
-        Turns of measured guideways are moved before a rotation that was given: what is reported is the rotation vector W of
-        both, exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
+        The turn of a measured guideway is fitted before a given rotation; reported is the rotation vector W of both:
+        exp([W]x) = exp([turn]x) turned, so that J(W) dW = J(turn) dturn.
         """
         if self.points is None:
             return None
@@ -178,6 +177,11 @@ class Condensed:
             theta[0][0] += B @ B
             theta += [2 * B, -2 * np.outer(A, B).ravel(), -2 * np.outer(v, B).ravel()]
         return np.concatenate([*theta, [1.0]])
+
+
+def by_motion(u: np.ndarray, R: np.ndarray | None, offset: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients u (N, 3) by position, and by a rotation vector in the world for a joint at `offset` on a plate of R."""
+    return u, np.zeros_like(u) if R is None else np.cross(R @ offset, u)
 
 
 def _squares(length: float, A: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -14,14 +14,19 @@ from gantrytau_optimica.fitting.least_squares import Minimum, Prior, least_squar
 TAPE = 0.01  # m; combinations of parameters that data hold worse than a tape measure stay where they started
 
 
+def tape_limit(noise: float, tape: float = TAPE) -> float:
+    """Singular value below which a direction stays at its start: a prior as wide as a tape measure still counts."""
+    return noise / tape * (1 - 1e-6)
+
+
 @dataclass(frozen=True)
 class Group(Record):
-    """Links and where in the vector x of the group their parameters stand.
+    """Links with common parameters x.
 
-    x: start values (n,); names: of the parameters, (n,); free: which of them are identified; scale: what of each moves a
-    joint by a metre; places: for each link the indices in x of its parameters; prior: value and standard deviation of
-    parameters, by index; noise: standard deviation of a closure error that decides what data hold, None where it is to be
-    found from what is left; tape: that of start values, m.
+    x: start values (n,); names: of the parameters, (n,); free: mask of the identified ones; scale: change of each for a
+    metre at a joint; places: indices in x of the parameters of each link; prior: value and standard deviation by index;
+    noise: standard deviation of a closure error, None to estimate it from the residuals; tape: standard deviation of the
+    start values, m.
     """
 
     chains: tuple[Chain | ArmLink, ...]
@@ -71,19 +76,14 @@ class Group(Record):
             blocks[-1][:, places] = small
         return np.vstack(blocks)
 
-    def prior_rows(self, noise: float) -> Prior:
-        """Rows of the prior beside closure errors of such a standard deviation."""
-        held = self.prior.values()
-        return Prior(list(self.prior), [m for m, _ in held], [noise / deviation for _, deviation in held])
-
     def minimum(self, x: np.ndarray, noise: float, priors: Sequence[Prior] = (), **along: Any) -> Minimum:
         """Least squares from x; noise: of a closure error, which weighs the prior; along: as of `least_squares`."""
-        rows = [self.prior_rows(noise), *priors]
+        rows = [Prior.of(self.prior, noise), *priors]
         scale = np.where(self.free, self.scale, 0.0)
         return least_squares(self.residuals, self.jacobian, x, scale=scale, priors=rows, **along)
 
     def started(self, x: np.ndarray) -> "Group":
-        """The same with other start values."""
+        """This group with other start values."""
         return replace(self, x=x.copy())
 
     def over(self, q: np.ndarray, r: np.ndarray, R: np.ndarray | None) -> "Group":

@@ -49,7 +49,7 @@ class NominalRods(Record):
         return np.zeros(3) if name is None else self.values[name]
 
     def base(self, arm: RodArm) -> np.ndarray:
-        """What an arm adds to the joints of rods that have places of their own on its cart, (3,) in m."""
+        """Offset of an arm, added to the joints of its rods on the cart, (3,) in m."""
         return self.vector(arm.offset) if arm.rods[0].offset is not None else np.zeros(3)
 
     def joint(self, arm: RodArm, rod: SingleRod) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a fit of named parameters found: values, how sure they are, and how well they foretell poses that were held out."""
+"""Calibration by named parameters: values, standard deviations, errors at held-out poses."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -48,7 +48,7 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @property
     def nominal_values(self) -> dict[str, float]:
-        """What the parameters were before."""
+        """Nominal values of the parameters."""
         tool = self.residuals.tool
         return dict(zip(tool.names, tool.nominal.tolist(), strict=True))
 
@@ -86,7 +86,7 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @property
     def minima(self) -> tuple[Minimum, ...]:
-        """That of all numbers."""
+        """Covariance of all parameters."""
         return (self.minimum,)
 
     @cached_property
@@ -95,7 +95,7 @@ class NamedCalibration(Reported, FittedNumbers):
 
     @cached_property
     def base(self) -> BaseParameters:
-        """What data determine in place of parameters that they do not tell apart."""
+        """Determined combinations of indistinguishable parameters."""
         return base_of_directions(self.minimum.directions[self.rank :], self.residuals.scale)
 
     @cached_property

@@ -25,7 +25,7 @@ LISTED = 2000  # poses, of more the worst
 
 @dataclass(frozen=True, eq=False)
 class About(Record):
-    """What a report says beside the calibration itself, as far as that is known.
+    """Data of a report beside the calibration itself, all optional.
 
     robot: its name with its prototype; facts: in words by heading, such as goal and device; good, verdict: whether it is
     good enough; notes: sentences; lines: of the rows in their file (N,); numbers: of the poses in a plan (N,); validation:

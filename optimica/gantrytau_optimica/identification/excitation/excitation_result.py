@@ -8,6 +8,7 @@ import numpy as np
 
 from gantrytau import ModelError, Samples
 from gantrytau.describing.record import Record
+from gantrytau_optimica.fitting.linear import column_norms
 from gantrytau_optimica.identification.excitation.fourier_series import FourierSeries
 from gantrytau_optimica.identification.excitation.motion_regressor import MotionRegressor
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -114,8 +115,7 @@ class Excitation(Record):
 
 def deviations(Y: np.ndarray) -> np.ndarray:
     """Deviations (k,) of parameters by independent noise of 1 in all rows of Y (N, k); infinite where there is no slope."""
-    norms = np.linalg.norm(Y, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
+    scale = column_norms(Y)
     _, sizes, V = np.linalg.svd(Y / scale, full_matrices=False)
     if sizes[-1] <= 1e-12 * sizes[0]:
         return np.full(Y.shape[1], np.inf)

@@ -39,7 +39,7 @@ class ActuatorRows:
         return np.linalg.pinv(self.X)
 
     def beside(self, values: np.ndarray) -> np.ndarray:
-        """What friction cannot account for."""
+        """Residuals of values after the fit of friction."""
         return values - self.X @ (self.inverse @ values)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import linear_least_squares
 from gantrytau_optimica.identification.least_squares.factors import Factors
 
 GAP = 1e-8  # of the sum of squares, which a minimum within conditions may leave too much
@@ -40,7 +41,7 @@ class Condition:
         return p[self.places] + share * away
 
     def eigenvalues(self, p: np.ndarray) -> np.ndarray:
-        """Of the matrix whose diagonal is normed, (n,)."""
+        """Eigenvalues (n,) of the matrix, scaled to a diagonal of ones."""
         C = self.at(p)
         size = np.sqrt(np.abs(np.diag(C)))
         size = np.maximum(size, 1e-9 * np.max(size))  # a thin plate has none across
@@ -49,7 +50,7 @@ class Condition:
 
 @dataclass(frozen=True, eq=False)
 class ParameterLimits:
-    """What parameters can be: least (k,), -inf for none, and conditions on several together."""
+    """Limits of parameters: least (k,), -inf for none, and conditions on several together."""
 
     least: np.ndarray
     conditions: tuple[Condition, ...] = ()
@@ -79,10 +80,9 @@ def within(
         for _ in range(STEPS):
             S, right = barrier.linear(p)
             A = np.vstack([factors.R, np.sqrt(mu) * S])[:, free]
-            norms = np.linalg.norm(A, axis=0) + 1e-300
             b = np.concatenate([factors.d - factors.R @ p, np.sqrt(mu) * right])
             step = np.zeros(len(p))
-            step[free] = np.linalg.lstsq(A / norms, b, rcond=None)[0] / norms
+            step[free] = linear_least_squares(A, b)
             now, decrement = (
                 factors.squares(p) / 2 + mu * barrier.value(p),
                 float(np.sum((A @ step[free]) ** 2)),

@@ -19,7 +19,7 @@ MOST = 20_000  # rows that show how a log moves
 
 
 def check_log(t: np.ndarray, q: np.ndarray, f: np.ndarray, finite: np.ndarray) -> tuple[Finding, ...]:
-    """What is doubtful in a log t (N,), q and f (N, n), of which the rows `finite` (N,) are numbers."""
+    """Findings in a log t (N,), q and f (N, n); finite: mask (N,) of the finite rows."""
     return (
         *_not_finite(finite),
         *_times(t, finite),

@@ -138,7 +138,7 @@ class MotionLog(Record):
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """What is doubtful in this log, whatever the robot: kinds "nan", "time", "gaps", "lost rows", "millimetres",
+        """Findings in this log, whatever the robot: kinds "nan", "time", "gaps", "lost rows", "millimetres",
         "saturated force", "slow", "constant velocity", "delay", "sign of force".
         """
         return check_log(self.t, self.q, self.f, self.finite)

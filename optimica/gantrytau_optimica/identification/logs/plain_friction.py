@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import column_norms
+
 LAGS = 25  # samples, to either side, among which the best is looked for
 BETTER = 0.97  # of the squares without lag, which a lag must leave to be told; one sample rarely does
 ENOUGH = 0.5  # of the forces' variance, that must be explained before anything is said
@@ -51,8 +53,7 @@ def _columns(q: np.ndarray, v: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
 
 def _basis(columns: np.ndarray) -> np.ndarray:
     """Orthonormal columns of the same span."""
-    sizes = np.linalg.norm(columns, axis=0)
-    return np.linalg.qr(columns / np.where(sizes > 0, sizes, 1.0))[0]
+    return np.linalg.qr(columns / column_norms(columns))[0]
 
 
 def _left(bases: Sequence[np.ndarray], f: np.ndarray) -> float:

@@ -23,7 +23,7 @@ FACTOR = 4.0  # to either side: masses and friction of a robot are better known 
 
 
 def check_motion(robot: Model | Dae, log: MotionLog) -> tuple[Finding, ...]:
-    """What of a log does not go with a robot: kinds "workspace", "order of actuators", "unit of force",
+    """Disagreements of a log with a robot: kinds "workspace", "order of actuators", "unit of force",
     "sign of force".
 
     Raises ModelError where not all actuators are logged, or more than there are.

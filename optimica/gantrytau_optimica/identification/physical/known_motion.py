@@ -52,7 +52,7 @@ class KnownResponse:
         return cls(s, G, weight / np.linalg.norm(weight * G), float(np.median(sizes)))
 
     def left(self, form: MechanicalForm) -> np.ndarray:
-        """What a form leaves of the response, as real numbers."""
+        """Residuals of the response by a form, as real numbers."""
         found = ((form.response(self.s) - self.G) * self.weight).ravel()
         return np.concatenate([np.real(found), np.imag(found)])
 
@@ -94,13 +94,13 @@ class KnownMotion:
         return cls(u, y, system.period, frequency)
 
     def left(self, form: MechanicalForm) -> np.ndarray:
-        """What the best start and rest leave of the positions, each in units of its motion about the mean."""
+        """Residuals of the positions with the best start and rest, each over its motion about the mean."""
         sampled = form.system.discrete(self.period)
         rest = self.y - followed((sampled.A, sampled.B, sampled.C, sampled.D), self.u, self.y)
         return (rest / np.linalg.norm(self.y - self.y.mean(axis=0), axis=0)).ravel() / np.sqrt(len(form.M))
 
     def missed(self, form: MechanicalForm) -> float:
-        """Share of the motion, by norm, that a form does not explain and that is no white noise.
+        """Share of the motion, by norm, outside of a form and of white noise.
 
         Second differences of white noise have six times its variance; those of modes far below half of the sampling
         frequency have next to none.

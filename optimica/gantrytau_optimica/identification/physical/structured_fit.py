@@ -16,7 +16,7 @@ DONE = 1e-13  # change of squares and of unknowns
 
 
 class Known(Protocol):
-    """What a form is fitted to: the response of a model, or measured motion."""
+    """Data of the fit of a form: response of a model, or measured motion."""
 
     @property
     def frequency(self) -> float: ...

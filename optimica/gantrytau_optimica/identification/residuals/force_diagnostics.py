@@ -18,7 +18,7 @@ PULLED = 5.0  # deviations beyond a limit, from which on data contradict it
 def force_diagnostics(
     problem: RigidRegression, found: LimitedFit, rows: Sequence[LogRows], logs: Sequence[MotionLog]
 ) -> Diagnostics:
-    """Of filtered forces; logs: as they were given, of which rows are told, and whether one comes twice."""
+    """Diagnostics of filtered forces; logs: as given, of which rows are told, and whether one comes twice."""
     free = found.base.independent[~found.active[found.base.independent]]
     series = []
     for run, (one, motion) in enumerate(zip(rows, problem.motions, strict=True)):

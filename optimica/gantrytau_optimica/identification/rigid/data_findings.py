@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau_optimica.fitting.finding import Finding
+from gantrytau_optimica.fitting.linear import linear_least_squares
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import LimitedFit
 from gantrytau_optimica.identification.rigid.residual_covariance import LogRows, covariance
@@ -39,9 +40,7 @@ def delay_findings(rows: Sequence[LogRows], found: LimitedFit) -> list[Finding]:
     X = np.concatenate([r.A[r.moving][:, free] for r in rows])
     slope = np.concatenate([np.gradient(r.b, r.period, axis=0)[r.moving] for r in rows])
     left = np.concatenate([r.left(found.p)[r.moving] for r in rows])
-    sizes = np.linalg.norm(X, axis=0)
-    X = X / np.where(sizes > 0, sizes, 1.0)
-    own = slope - X @ np.linalg.lstsq(X, slope, rcond=None)[0]
+    own = slope - X @ linear_least_squares(X, slope)
     if not own @ own > 0 or not left @ left > 0:
         return []
     late = -(own @ left) / (own @ own)  # s

@@ -65,7 +65,7 @@ def usable_parts(
 def beside_robot(
     dae: Dae, coordinates: Sequence[str], logs: Sequence[MotionLog], known: Sequence[Finding]
 ) -> list[Finding]:
-    """What logs have that does not go with the robot and its nominal values, of kinds that are not known yet."""
+    """Disagreements of logs with the robot and its nominal values, of kinds not in `known`."""
     if not all(name.endswith((".f", ".tau")) for name in dae.inputs) or driven_joints(dae) != tuple(
         coordinates
     ):
@@ -80,7 +80,7 @@ def beside_robot(
 
 
 def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[float, list[Finding]]:
-    """Rms of what a fit of the first half leaves of the second, N, and what that says. p: the fit of the first half."""
+    """Rms residual, N, of the second half by a fit of the first, and its message. p: the fit of the first half."""
     first, second = (np.sqrt(h.squares(p) / max(h.rows, 1)) for h in halves)
     findings = []
     if second > WORSE * first:
@@ -95,7 +95,7 @@ def half_against_half(halves: tuple[Factors, Factors], p: np.ndarray) -> tuple[f
 def fit_findings(
     names: Sequence[str], found: LimitedFit, weak: Sequence[str], nonlinear: Sequence[str]
 ) -> list[Finding]:
-    """What the motion does not tell, what cannot be so, and what was found by iteration."""
+    """Findings: undetermined parameters, impossible values, and values found by iteration."""
     findings = []
     if nonlinear:
         words = f"forces are not linear in {', '.join(nonlinear)}; found by Gauss-Newton from the robot's own values"

@@ -49,7 +49,7 @@ class FilteredMotion:
         return low_pass(y, self.log_period, _wide(self.log_period, self.cutoff))[:: self.thinned]
 
     def filtered(self, y: np.ndarray) -> np.ndarray:
-        """What H leaves of rows, without the ends."""
+        """Rows filtered by H, without the ends."""
         return self._inner(low_pass(y, self.period, self.cutoff))
 
     def moving(self, minimum_speed: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""How sure parameters are, from what is left of the forces: neighbouring rows are not independent.
+"""Covariance of parameters from the residuals of forces, whose neighbouring rows are correlated.
 
     p = A^+ b:  cov p = A^+ cov(e) A^+T,  cov(e) of each joint and log by the spectrum of what is left
 
@@ -33,7 +33,7 @@ class LogRows:
         return replace(self, A=self.A[rows], b=self.b[rows], moving=self.moving[rows])
 
     def left(self, p: np.ndarray) -> np.ndarray:
-        """What parameters leave of the forces, (N, n), zero where rows do not count."""
+        """Residuals of the forces, (N, n), zero where rows do not count."""
         return np.where(self.moving, self.b - self.A @ p, 0.0)
 
 

@@ -50,7 +50,7 @@ class RigidRegression:
 
     @property
     def limits(self) -> ParameterLimits:
-        """What masses, inertias and frictions there can be."""
+        """Limits of masses, inertias and frictions."""
         return ParameterLimits(self.least, tuple(self._condition(body) for body in self.dynamics.bodies))
 
     def _condition(self, body: BodyParameters) -> Condition:
@@ -68,7 +68,7 @@ class RigidRegression:
         return rows[:: max(1, len(rows) // LOOKED_AT)]
 
     def without_silent(self) -> "RigidRegression":
-        """The same without parameters of the robot on which no force depends."""
+        """This regression without the parameters of the robot that move no force."""
         A, _ = self.dynamics.slopes(self._some_rows(), self.dynamics.nominal)
         moved = np.nanmax(np.abs(A), axis=(0, 1), initial=0.0) > 0
         names = tuple(n for n, moves in zip(self.dynamics.names, moved, strict=True) if moves)

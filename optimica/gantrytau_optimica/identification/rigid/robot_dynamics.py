@@ -71,7 +71,7 @@ class RobotDynamics:
         return np.array([self._own[model_name(self.dae, n)] for n in self.names])
 
     def in_model(self, p: Sequence[Any]) -> dict[str, Any]:
-        """What the model is given for parameters p, by model name; numbers or expressions, as p is."""
+        """Values of the model for parameters p, by model name; numbers or expressions, as p is."""
         asked = dict(zip(self.names, p, strict=True))
         found: dict[str, Any] = {}
         for body in self.bodies:
@@ -177,7 +177,7 @@ def _inverse_dynamics(
 
 
 def model_name(dae: Dae, name: str) -> str:
-    """What the model calls a parameter of a public name such as `cart_masses[0]`; others keep their own."""
+    """Name in the model of a parameter with a public name such as `cart_masses[0]`; others keep their own."""
     if name == "plate_mass":
         return next((n for n in PLATE if n in dae.adjustable), name)
     parted = re.fullmatch(r"(\w+)\[(\d+)\]", name)

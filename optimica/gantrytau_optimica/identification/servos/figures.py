@@ -19,7 +19,7 @@ def draw_steps(
     rest: np.ndarray,
     file: str | os.PathLike[str] | None,
 ) -> "Figure":
-    """A row for each actuator with the steps that it took, from rest (steps, n), and beside them what the law leaves."""
+    """A row for each actuator: its steps from rest (steps, n), and beside them the residuals of the law."""
     import matplotlib.pyplot as plt
 
     if file is not None:

@@ -21,7 +21,7 @@ Told = Iterator[tuple[str, np.ndarray | None, str]]  # kind, some of the steps o
 
 
 def servo_findings(i: int, rows: Sequence[ServoRows], fit: ServoFit, period: float) -> tuple[Finding, ...]:
-    """What is doubtful about one actuator.
+    """Findings on one actuator.
 
     Kinds "delay", "fast", "unit", "sign", "fit", "noise", "not settled", "not at rest", "one size", "friction",
     "saturation".

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import linear_least_squares
 from gantrytau_optimica.identification.rigid.residual_covariance import BAND, LogRows, covariance
 
 LATEST = 100  # samples of delay that are looked at
@@ -33,7 +34,7 @@ class ServoRows:
 
 @dataclass(frozen=True, eq=False)
 class ServoFit:
-    """What fits best. covariance: (2, 2) of pole and gain; rest: c of each step; latest: longest delay looked at.
+    """Best fit of one actuator. covariance: (2, 2) of pole and gain; rest: c of each step; latest: longest delay looked at.
 
     left: sums of squares by delay, of those that were looked at closely; residuals: by step.
     """
@@ -113,9 +114,7 @@ def _refined(rows: Sequence[ServoRows], delay: int, pole: float) -> tuple[np.nda
     squares = _squares(rows, p, delay)
     for _ in range(STEPS):
         J, left = np.vstack(_slopes(rows, p, delay)), np.concatenate(_left(rows, p, delay))
-        sizes = np.linalg.norm(J, axis=0)
-        sizes = np.where(sizes > 0, sizes, 1.0)
-        change = np.linalg.lstsq(J / sizes, left, rcond=None)[0] / sizes
+        change = linear_least_squares(J, left)
         share = 1.0
         while share > 1e-6:
             trial = _linear(rows, delay, float(np.clip(p[0] + share * change[0], 0.0, 1.0 - 1e-9)))

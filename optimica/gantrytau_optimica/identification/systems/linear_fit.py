@@ -5,6 +5,8 @@ y[k] = C A^k x0 + sum_j C A^(k-1-j) B u[j] + D u[k] + y0
 
 import numpy as np
 
+from gantrytau_optimica.fitting.linear import linear_least_squares
+
 
 def input_matrices(
     A: np.ndarray, C: np.ndarray, u: np.ndarray, y: np.ndarray
@@ -18,7 +20,7 @@ def input_matrices(
     for i in range(p):
         rows[:, i, n * m + i * m : n * m + (i + 1) * m] = u
     rows = np.concatenate([rows, _starts(powers)], axis=2).reshape(len(u) * p, -1)
-    found = _least_squares(rows, y.ravel())
+    found = linear_least_squares(rows, y.ravel())
     return found[: n * m].reshape(n, m), found[n * m : (n + p) * m].reshape(p, m)
 
 
@@ -35,7 +37,7 @@ def followed(system: tuple[np.ndarray, ...], u: np.ndarray, y: np.ndarray) -> np
     for j, pulses in enumerate(np.moveaxis(powers[:-1] @ B, 2, 0)):
         found[1:] += _convolved(pulses, u[:-1, j])
     free = _starts(powers).reshape(-1, len(A) + len(C))
-    return (found + (free @ _least_squares(free, (y - found).ravel())).reshape(y.shape)) * sizes
+    return (found + (free @ linear_least_squares(free, (y - found).ravel())).reshape(y.shape)) * sizes
 
 
 def free_responses(A: np.ndarray, C: np.ndarray, count: int) -> np.ndarray:
@@ -59,9 +61,3 @@ def _convolved(h: np.ndarray, u: np.ndarray) -> np.ndarray:
     spectrum = np.fft.rfft(u, length).reshape(-1, *[1] * (h.ndim - 1))
     product = np.fft.rfft(h, length, axis=0) * spectrum
     return np.fft.irfft(product, length, axis=0)[: len(u)]
-
-
-def _least_squares(rows: np.ndarray, y: np.ndarray) -> np.ndarray:
-    sizes = np.linalg.norm(rows, axis=0)
-    sizes = np.where(sizes > 0, sizes, 1.0)
-    return np.linalg.lstsq(rows / sizes, y, rcond=None)[0] / sizes

@@ -36,7 +36,7 @@ class SharedSpace:
 
 
 def shared_space(u: np.ndarray, y: np.ndarray, rows: int) -> SharedSpace:
-    """What the past of inputs u (N, m) and outputs y (N, p) tells of their future, `rows` samples each."""
+    """Space shared by past and future of inputs u (N, m) and outputs y (N, p), `rows` samples each."""
     m, p = u.shape[1], y.shape[1]
     parts = [_hankel(u, rows, rows), _hankel(u, 0, rows), _hankel(y, 0, rows), _hankel(y, rows, rows)]
     # constants of u and y are projected out with the future inputs
