@@ -112,14 +112,16 @@ def array(
     """An array of numbers in SI of one of the shapes, None for any length; texts bring their unit.
 
     A column of CasADi's DM is a vector where one is expected.
-    ModelError for another shape, for what is no number or beyond its limit, and unless `finite` is False for nan and
-    infinity.
+    ModelError for another shape, for what is no number or beyond its limit, and unless `finite` is False for nan,
+    infinity, and None, which is read as nan.
     """
     limits = _limits(least, above, None, None)
     wanted = f"{numbers_of(*shapes)}{limits}{_in(unit)}"
     try:
         values = np.asarray(_si(place, argument, found, unit) if unit else found)
-        if values.dtype.kind not in "iuf" and not (values.dtype.kind == "O" and _numeric(values)):
+        if values.dtype.kind not in "iuf" and not (
+            values.dtype.kind == "O" and _numeric(values, lost=not finite)
+        ):
             raise TypeError
         values = values.astype(float)
     except (TypeError, ValueError, OverflowError):
@@ -144,9 +146,9 @@ def array(
     return values
 
 
-def _numeric(values: np.ndarray) -> bool:
-    """Whether an array of objects holds numbers alone: a symbol of CasADi makes a float too, nan."""
-    kinds = {type(value) for value in values.flat}
+def _numeric(values: np.ndarray, lost: bool) -> bool:
+    """Whether an array of objects holds numbers alone, or None for what is lost; a symbol of CasADi makes a float too, nan."""
+    kinds = {type(value) for value in values.flat} - ({type(None)} if lost and values.ndim else set())
     return all(issubclass(kind, Number) and kind is not bool for kind in kinds)
 
 

@@ -110,9 +110,11 @@ def test_an_array_has_its_shape_and_unit():
     assert array("f", "x", [Fraction(1, 2), Decimal(1)], (2,)).tolist() == [0.5, 1.0]
     assert told(array, [1, np.nan], (2,)) == "f: found x[1] = nan, expected finite numbers"
     assert np.isnan(array("f", "x", [1, np.nan], (2,), finite=False)[1])
+    assert np.isnan(array("f", "x", [1, None], (2,), finite=False)[1])
+    assert ", expected " in told(array, [1, None], (2,))
 
 
-@pytest.mark.parametrize("found", [["a"], [1, [2, 3]], [1j], None, [True], "1", [None], [ca.SX.sym("u"), 1]])
+@pytest.mark.parametrize("found", [["a"], [1, [2, 3]], [1j], None, [True], "1", [ca.SX.sym("u"), 1]])
 def test_what_holds_no_numbers_is_refused(found):
     assert ", expected " in told(array, found, (None,), finite=False)
 
