@@ -35,6 +35,17 @@ class Given:
         return f"{self.name}=" if self.value is ... else f"{self.name}={short(self.value)}"
 
 
+class Sentence(str):
+    """A text that keeps its parts: an argument of the called function in it is a `Given`, as in an error."""
+
+    parts: tuple[str | Given, ...]
+
+    def __new__(cls, *parts: str | Given) -> Self:
+        made = super().__new__(cls, "".join(map(str, parts)))
+        made.parts = parts
+        return made
+
+
 class GantryTauError(Exception):
     """Base class of all errors of this toolkit.
 

@@ -26,6 +26,7 @@ def export(
     to: Annotated[
         Path | None, typer.Option(help="The file to write.", show_default="the model's name.fmu")
     ] = None,
+    fmi: export_options.Version = "3.0",
     platforms: export_options.Platforms = None,
     interface: export_options.Interface = "both",
     no_sources: export_options.NoSources = False,
@@ -58,7 +59,11 @@ def export(
             sources=not no_sources,
             experiment=experiment,
         )
-        policy |= names | {"interfaces": export_options.INTERFACES[interface], "build": wanted}
+        policy |= names | {
+            "fmi": export_options.VERSIONS.get(fmi, fmi),
+            "interfaces": export_options.INTERFACES[interface],
+            "build": wanted,
+        }
         chosen = build(model, prototype, set_ or ())
         flat = flatten(chosen.model)
         for argument, asked in names.items():

@@ -19,6 +19,7 @@ from gantrytau.commands.printing.reporting import MISUSE, fail, note
 from gantrytau.commands.printing.spelling import RUNNING, Spelling
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
+MISSING: Any = next(c for c in typer.BadParameter.__subclasses__() if c.__name__ == "MissingParameter")
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
 PLAINLY = {
     "Input should be a valid number, unable to parse string as a number": "expected a number, as 0.5",
@@ -87,6 +88,8 @@ class Commands(TyperGroup):
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
         except USAGE_ERROR as error:
+            if isinstance(error, MISSING) and any(p.name == "example" for p in error.ctx.command.params):
+                error.message = f"`{error.ctx.command_path} --example` prints one to begin with"
             for said, here in PLAINLY.items():
                 error.message = error.message.replace(said, here)
             if not json:
