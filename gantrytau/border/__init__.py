@@ -11,7 +11,7 @@ from gantrytau.border.named import (
     similar,
     source_of,
 )
-from gantrytau.border.refusal import Given, Sentence, python_error, short, user_lines
+from gantrytau.border.refusal import Given, Sentence, meant, python_error, short, user_lines
 from gantrytau.border.schema import Value, at, read_table
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "import_by_name",
     "listed",
     "load",
+    "meant",
     "named",
     "prototype",
     "python_error",

@@ -144,6 +144,12 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     return f"; there is {shown}." if names else "."
 
 
+def meant(wrong: str, words: Iterable[str]) -> str:
+    """The closest of a few words, which a message lists, as a question that ends it; "" if none is close."""
+    asked = did_you_mean(wrong, words)
+    return asked if "did you mean" in asked else ""
+
+
 def in_words(error: BaseException) -> str:
     """What an error of Python or CasADi says, in one line, with a remedy where one is known."""
     if isinstance(error, AttributeError) and error.obj is not None and error.name:

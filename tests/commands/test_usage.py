@@ -16,6 +16,7 @@ MISUSE = 2
         (["fmu", "info", "a.fmu", "--every"], "--every"),
         (["simulate", "Pendulum", "--stop", "x"], "--stop"),
         (["simulat"], "simulat"),
+        (["simulate", "Pendulum", "--singular", "stp"], "did you mean 'stop'?"),
     ],
 )
 def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
@@ -27,6 +28,10 @@ def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
     assert printed.stderr == ""
     assert spoken.stdout == ""
     assert words in spoken.stderr
+
+
+def test_a_missing_file_is_begun_by_an_example(fails):
+    assert "learn --example` prints one" in fails(MISUSE, "learn")
 
 
 def test_the_version_is_told(run):

@@ -3,6 +3,7 @@
 import ast
 import errno
 import os
+import re
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from gantrytau import heeding_interrupts
+from gantrytau.border import meant
 from gantrytau.commands.printing.help_pages import tidy
 from gantrytau.commands.printing.reporting import MISUSE, fail, note
 from gantrytau.commands.printing.spelling import RUNNING, Spelling
@@ -92,6 +94,9 @@ class Commands(TyperGroup):
                 error.message = f"`{error.ctx.command_path} --example` prints one to begin with"
             for said, here in PLAINLY.items():
                 error.message = error.message.replace(said, here)
+            if " is not one of " in error.message:
+                found, *words = re.findall("'([^']*)'", error.message)
+                error.message = error.message.rstrip(".") + (meant(found, words) or ".")
             if not json:
                 raise
             fail(error.format_message(), MISUSE, json)
