@@ -52,7 +52,7 @@ class Commands(TyperGroup):
         if cmd_name not in self.places:
             return None
         if self.listing:
-            return TyperCommand(cmd_name, help=_first_line(self.places[cmd_name][0]))
+            return TyperCommand(cmd_name, help=_first_line(cmd_name, self.places[cmd_name][0]))
         if cmd_name not in self.commands:
             self.commands[cmd_name] = _loaded(cmd_name, *self.places[cmd_name])
         return self.commands[cmd_name]
@@ -90,7 +90,8 @@ class Commands(TyperGroup):
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
         except USAGE_ERROR as error:
-            if isinstance(error, MISSING) and any(p.name == "example" for p in error.ctx.command.params):
+            begins = any(p.name == "example" for p in error.ctx.command.params) if error.ctx else False
+            if begins and isinstance(error, MISSING) and error.param.param_type_name == "argument":
                 error.message = f"`{error.ctx.command_path} --example` prints one to begin with"
             for said, here in PLAINLY.items():
                 error.message = error.message.replace(said, here)
@@ -137,12 +138,14 @@ def _loaded(name: str, place: str, example: str) -> Any:
     return found
 
 
-def _first_line(place: str) -> str:
-    """What the docstring of a module says behind the name of its command."""
+def _first_line(name: str, place: str) -> str:
+    """The first line of the docstring of a command, or what that of a group's module says behind its name."""
     path = Path(__file__).parents[1].joinpath(*place.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
-    words = text.partition("\n")[0].partition(": ")[2]
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    function = next((one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == name), None)
+    text = (ast.get_docstring(function or tree) or "").partition("\n")[0]
+    words = text if function else text.partition(": ")[2]
     return f"{words[:1].upper()}{words[1:]}"
 
 
