@@ -139,14 +139,16 @@ def _loaded(name: str, place: str, example: str) -> Any:
 
 
 def _first_line(name: str, place: str) -> str:
-    """The first line of the docstring of a command, or what that of a group's module says behind its name."""
+    """The first line of the docstring of a command, or the words of a group; its module is read, not imported."""
     path = Path(__file__).parents[1].joinpath(*place.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     tree = ast.parse(file.read_text(encoding="utf-8"))
-    function = next((one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == name), None)
-    text = (ast.get_docstring(function or tree) or "").partition("\n")[0]
-    words = text if function else text.partition(": ")[2]
-    return f"{words[:1].upper()}{words[1:]}"
+    for one in tree.body:
+        if isinstance(one, ast.FunctionDef) and one.name == name:
+            return (ast.get_docstring(one) or "").partition("\n")[0]
+        if isinstance(one, ast.Assign) and isinstance(one.value, ast.Call):  # app = group(words, ...)
+            return ast.literal_eval(one.value.args[0])
+    raise AssertionError(name)
 
 
 def _drop_output() -> None:
