@@ -34,6 +34,11 @@ def test_a_missing_file_is_begun_by_an_example(fails):
     assert "learn --example` prints one" in fails(MISUSE, "learn")
 
 
+def test_a_misspelt_word_in_a_group_is_asked_for_once(fails):
+    message = fails(MISUSE, "fmu", "export", "Pendulum", "--solver", "rodas")
+    assert message.count("did you mean 'rodas4'?") == 1
+
+
 def test_the_version_is_told(run):
     told = run("--version")
     assert (told.exit_code, told.stdout) == (0, f"gantrytau {version('gantrytau')}\n")

@@ -95,7 +95,9 @@ class Commands(TyperGroup):
                 error.message = f"`{error.ctx.command_path} --example` prints one to begin with"
             for said, here in PLAINLY.items():
                 error.message = error.message.replace(said, here)
-            if " is not one of " in error.message:
+            if (
+                " is not one of " in error.message and "did you mean" not in error.message
+            ):  # a group in a group
                 found, *words = re.findall("'([^']*)'", error.message)
                 error.message = error.message.rstrip(".") + (meant(found, words) or ".")
             if not json:
