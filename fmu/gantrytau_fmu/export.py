@@ -152,9 +152,9 @@ def _found(dae: Dae, name: str) -> str:
     kind = "a parameter" if name in set(dae.parameters) else "an input" if name in set(dae.inputs) else ""
     if kind:
         raise ModelError(
-            f"find: {name} is {kind} of this FMU, expected variables that it computes; leave it out, "
+            f"{name} is {kind} of this FMU, expected variables that it computes; leave it out, "
             f"{kind.split()[1]}s are in the FMU anyway",
-            place="export_fmu",
+            place="export_fmu: find",
             argument="find",
         )
     return name

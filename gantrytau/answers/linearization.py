@@ -148,7 +148,9 @@ def _expanded(dae: Translated, which: str, wanted: Sequence[str]) -> tuple[str, 
     try:
         return tuple(n for name in wanted for n in dae.expand(name))
     except ModelError as error:
-        raise ModelError(f"{which}: {error}", argument=which) from error
+        refused = error.within(which)
+        refused.argument = which
+        raise refused from error
 
 
 def _matrices(

@@ -11,18 +11,20 @@ from gantrytau.border.named import (
     similar,
     source_of,
 )
-from gantrytau.border.refusal import Given, python_error, short, user_lines
+from gantrytau.border.refusal import Given, Sentence, meant, python_error, short, user_lines
 from gantrytau.border.schema import Value, at, read_table
 
 __all__ = [
     "Given",
     "NamedObject",
     "NotLoaded",
+    "Sentence",
     "Value",
     "at",
     "import_by_name",
     "listed",
     "load",
+    "meant",
     "named",
     "prototype",
     "python_error",

@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args, get_origin
 import casadi as ca
 import numpy as np
 
-from gantrytau.border.refusal import GantryTauError, Given, ModelError, did_you_mean
+from gantrytau.border.refusal import GantryTauError, Given, ModelError, meant
 from gantrytau.border.units import given
 
 Shape = tuple[int | None, ...]
@@ -28,8 +28,7 @@ def one_of(place: str, argument: str, found: Any, words: Iterable[Any]) -> Any:
         if _same(found, word):
             return word
     names = [word for word in words if isinstance(word, str)]
-    meant = did_you_mean(found, names) if isinstance(found, str) else ""
-    guess = meant if "did you mean" in meant else ""
+    guess = meant(found, names) if isinstance(found, str) else ""
     raise _refused(place, argument, found, f"{either([repr(word) for word in words])}{guess}")
 
 

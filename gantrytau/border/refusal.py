@@ -35,6 +35,17 @@ class Given:
         return f"{self.name}=" if self.value is ... else f"{self.name}={short(self.value)}"
 
 
+class Sentence(str):
+    """A text that keeps its parts: an argument of the called function in it is a `Given`, as in an error."""
+
+    parts: tuple[str | Given, ...]
+
+    def __new__(cls, *parts: str | Given) -> Self:
+        made = super().__new__(cls, "".join(map(str, parts)))
+        made.parts = parts
+        return made
+
+
 class GantryTauError(Exception):
     """Base class of all errors of this toolkit.
 
@@ -132,6 +143,12 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
         return f"; did you mean '{close[0]}'{f' ({words})' if words else ''}?"
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     return f"; there is {shown}." if names else "."
+
+
+def meant(wrong: str, words: Iterable[str]) -> str:
+    """The closest of a few words, which a message lists, as a question that ends it; "" if none is close."""
+    asked = did_you_mean(wrong, words)
+    return asked if "did you mean" in asked else ""
 
 
 def in_words(error: BaseException) -> str:

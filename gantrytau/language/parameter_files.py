@@ -7,6 +7,7 @@ from typing import Any
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.border.schema import read_toml
+from gantrytau.border.units import si
 
 OF = "Parameters of "  # begins the first line of a file, which names the robot they belong to
 
@@ -16,7 +17,11 @@ def read_parameters(file: Path) -> dict[str, Any]:
     table = read_toml(file)
     found: dict[str, Any] = {}
     for name, value in _leaves("", table):
-        if not _numeric(value):
+        try:
+            good = _numeric(value)
+        except ModelError as error:
+            raise error.within(f"{file}: {name}") from error
+        if not good:
             raise ModelError(f"{file}: found {name} = {value!r}, expected a number or a vector")
         found[name] = value
     if not found:
@@ -45,7 +50,9 @@ def _leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def _numeric(value: Any) -> bool:
     if isinstance(value, list):
         return bool(value) and all(_numeric(part) for part in value)
-    return isinstance(value, (bool, int, float, str))  # of a text, the model finds out what its unit must be
+    if isinstance(value, str):
+        si(value)  # whether it is the unit of its parameter, the model finds out
+    return isinstance(value, (bool, int, float, str))
 
 
 def parameter_text(modifications: Mapping[str, Any], model: str, heading: str = "") -> str:

@@ -114,7 +114,7 @@ class Film:
         except KeyError as error:
             raise ModelError(
                 f"{self.title or 'result'}: found no {error.args[0]}, expected all that its shapes hang on; simulate the "
-                "same model with all outputs, without outputs=[...]"
+                "same model with all outputs"
             ) from None
 
 

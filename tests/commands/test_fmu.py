@@ -87,7 +87,7 @@ def test_an_export_is_told(run, asked, cart, tmp_path, monkeypatch):
 def test_options_arrive(run, asked, cart, tmp_path):
     arguments = [
         "--fmi",
-        "2.0",
+        "2",
         "--platforms",
         "native,win64",
         "--solver",
@@ -144,6 +144,8 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
     ("arguments", "message"),
     [
         (["--to", "cart.zip"], "--to cart.zip: found the suffix '.zip', expected '.fmu'"),
+        (["--stop", "0"], "--stop 0.0: expected a number above 0"),
+        (["--stop", "nan"], "--stop nan: expected a number above 0"),
         (["--step", "3", "--stop", "2"], "--step 3: expected more than 0 and at most the 2 s until the stop"),
         (["--set", "n=1"], "--set n: Cart has no 'n'"),
     ],

@@ -16,6 +16,7 @@ MISUSE = 2
         (["fmu", "info", "a.fmu", "--every"], "--every"),
         (["simulate", "Pendulum", "--stop", "x"], "--stop"),
         (["simulat"], "simulat"),
+        (["simulate", "Pendulum", "--singular", "stp"], "did you mean 'stop'?"),
     ],
 )
 def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
@@ -27,6 +28,15 @@ def test_usage_errors_are_json_where_json_is_asked_for(run, arguments, words):
     assert printed.stderr == ""
     assert spoken.stdout == ""
     assert words in spoken.stderr
+
+
+def test_a_missing_file_is_begun_by_an_example(fails):
+    assert "learn --example` prints one" in fails(MISUSE, "learn")
+
+
+def test_a_misspelt_word_in_a_group_is_asked_for_once(fails):
+    message = fails(MISUSE, "fmu", "export", "Pendulum", "--solver", "rodas")
+    assert message.count("did you mean 'rodas4'?") == 1
 
 
 def test_the_version_is_told(run):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gantrytau.border.dimensions import BASE, dimension
-from gantrytau.border.refusal import Given, ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, Sentence, did_you_mean
 from gantrytau_fmu.systems.component import Component, Scalar, dotted, numeric
 from gantrytau_fmu.systems.drives import Drive, drives_of, numbers_of, without_units, wrong
 
@@ -108,12 +108,14 @@ def warn_of(inputs: Mapping[str, str], stacklevel: int) -> None:
     few = [f"{name} = {value}" for name, value in list(inputs.items())[:FEW]]
     more = f" and {len(inputs) - FEW} more" if len(inputs) > FEW else ""
     one = len(inputs) == 1
-    warnings.warn(
+    sentence = Sentence(
         f"nothing drives {'1 input, which keeps its value' if one else f'{len(inputs)} inputs, which keep their values'}: "
-        f"{', '.join(few)}{more}; give {'it' if one else 'them'} with inputs= or start=",
-        UnconnectedInputs,
-        stacklevel=stacklevel + 1,
+        f"{', '.join(few)}{more}; give {'it' if one else 'them'} with ",
+        Given("inputs"),
+        " or ",
+        Given("start"),
     )
+    warnings.warn(sentence, UnconnectedInputs, stacklevel=stacklevel + 1)
 
 
 def locate(components: Mapping[str, Component], name: str, causality: str = "") -> list[Place]:

@@ -32,7 +32,7 @@ def serves(
             for name, p in own.items()
             if p.kind is not p.VAR_KEYWORD and name not in options
         ]
-        parameters = [*made, *kept]
+        parameters = sorted([*made, *kept], key=lambda p: p.default is not p.empty)  # those required first
 
         @functools.wraps(command)
         def call(**values: Any) -> Any:

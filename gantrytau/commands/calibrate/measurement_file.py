@@ -46,7 +46,7 @@ class MeasurementFile:
 
     def words(self, finding: Finding) -> str:
         """A finding with lines in place of rows, and options in place of arguments."""
-        return "".join(RUNNING.get().part(part) for part in self.of_file(finding).parts)
+        return RUNNING.get().sentence(self.of_file(finding).parts)
 
 
 def calibrated(

@@ -11,6 +11,7 @@ from gantrytau import Model, ModelError
 from gantrytau.commands.calibrate import calibration_files, calibration_summary
 from gantrytau.commands.calibrate.measurement_file import MeasurementFile, calibrated
 from gantrytau.commands.printing.reporting import FAULT, answered, note, writable
+from gantrytau.commands.printing.spelling import worded
 from gantrytau_optimica.calibration import told_by_tool
 from gantrytau_optimica.procedure import MeasuredPlan, PlannedCell, measured_plan
 
@@ -62,6 +63,7 @@ def finish(
         found, verdict = told_by_tool(checked.calibration), None
     else:
         found, verdict = plan.judged(checked, policy["orientation"])
+        verdict = replace(verdict, reasons=tuple(map(worded, verdict.reasons)))
         _write_rest(plan)
     about = calibration_summary.about(
         found, measured, robot.name, plan, verdict, notes, checked if cross else None

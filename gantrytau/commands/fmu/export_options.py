@@ -10,6 +10,7 @@ INTERFACES = {
     "me": ("model-exchange",),
     "cs": ("co-simulation",),
 }
+VERSIONS = {"2": "2.0", "3": "3.0"}
 
 
 def _about(words: str, default: str | bool = False, *names: str) -> Any:
@@ -27,7 +28,6 @@ def _time(words: str, default: str) -> Any:
 
 
 OPTIONS = dict(
-    fmi="Version of the standard.",
     solver=typer.Option(help="Of Co-Simulation; rodas4 for stiff models.", rich_help_panel=EXPERIMENT),
     tolerance=typer.Option(help="Relative, of Co-Simulation.", rich_help_panel=EXPERIMENT),
 )
@@ -38,6 +38,9 @@ BUILD = dict(
     license=_about("Licence of the model, as BSD-3-Clause."),
     version=_about("Version of the model.", False, "--model-version"),
 )
+Version = Annotated[
+    Literal["2.0", "3.0", "2", "3"], typer.Option(metavar="[2.0|3.0]", help="Version of the standard.")
+]
 Platforms = Annotated[
     list[str] | None,
     typer.Option(

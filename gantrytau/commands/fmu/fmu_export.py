@@ -9,6 +9,7 @@ import typer
 
 from gantrytau import flatten
 from gantrytau.border import listed, source_of
+from gantrytau.border.checks import number
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
@@ -26,6 +27,7 @@ def export(
     to: Annotated[
         Path | None, typer.Option(help="The file to write.", show_default="the model's name.fmu")
     ] = None,
+    fmi: export_options.Version = "3.0",
     platforms: export_options.Platforms = None,
     interface: export_options.Interface = "both",
     no_sources: export_options.NoSources = False,
@@ -58,7 +60,11 @@ def export(
             sources=not no_sources,
             experiment=experiment,
         )
-        policy |= names | {"interfaces": export_options.INTERFACES[interface], "build": wanted}
+        policy |= names | {
+            "fmi": export_options.VERSIONS.get(fmi, fmi),
+            "interfaces": export_options.INTERFACES[interface],
+            "build": wanted,
+        }
         chosen = build(model, prototype, set_ or ())
         flat = flatten(chosen.model)
         for argument, asked in names.items():
@@ -80,7 +86,7 @@ def _experiment(stop: float | None, step: float | None, tolerance: float) -> Def
     if stop is None and step is None:
         return None
     usual = DefaultExperiment()
-    stop = stop or usual.stop or 1.0
+    stop = number("export", "stop", usual.stop if stop is None else stop, above=0.0)
     if step is not None and not 0 < step <= stop:
         raise CommandError(f"--step {step:g}: expected more than 0 and at most the {stop:g} s until the stop")
     return DefaultExperiment(stop=stop, step=step or min(usual.step or stop, stop), tolerance=tolerance)

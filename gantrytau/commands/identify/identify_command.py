@@ -19,6 +19,7 @@ from gantrytau.commands.printing.reporting import (
     reporting,
     written,
 )
+from gantrytau.commands.printing.spelling import RUNNING
 from gantrytau_optimica import Finding, Identification, MotionLog
 from gantrytau_optimica import identify as identified
 from gantrytau_optimica.identification import check_motion
@@ -107,9 +108,17 @@ def summary(found: Identification, noticed: list[tuple[Path, Finding, int]]) -> 
     told: list[dict[str, Any]] = []
     for file, f, count in noticed:
         lines = MotionLog.lines(file, f.rows[:MANY]).tolist() if 0 < f.rows.size < count else []
-        told.append(dict(file=file, kind=f.kind, message=f.message, rows=f.rows[:MANY], lines=lines))
+        told.append(
+            dict(
+                file=file,
+                kind=f.kind,
+                message=RUNNING.get().sentence(f.parts),
+                rows=f.rows[:MANY],
+                lines=lines,
+            )
+        )
     told += [
-        dict(file=None, kind=f.kind, message=f.message, rows=f.rows[:MANY], lines=[])
+        dict(file=None, kind=f.kind, message=RUNNING.get().sentence(f.parts), rows=f.rows[:MANY], lines=[])
         for f in found.findings
         if f.kind not in {one["kind"] for one in told}
     ]

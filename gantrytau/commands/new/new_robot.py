@@ -37,8 +37,9 @@ def robot(
             target = folder / template.name.removesuffix(".txt")
             write_text(template.read_text(encoding="utf-8").replace(NAME, name), target)
             written.append(target)
-        next_ = f"Next: cd {folder} && gantrytau check robot.py:FiveBar; README.md has more commands"
-        answered(json, {"folder": folder}, next_, written)
+        answered(json, {"folder": folder}, None, written)
+        if not json:
+            typer.echo(f"Next: cd {folder} && gantrytau check robot.py:FiveBar; README.md has more commands")
 
 
 def _make(folder: Path) -> None:

@@ -3,6 +3,7 @@
 import ast
 import errno
 import os
+import re
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,11 +15,13 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from gantrytau import heeding_interrupts
+from gantrytau.border import meant
 from gantrytau.commands.printing.help_pages import tidy
 from gantrytau.commands.printing.reporting import MISUSE, fail, note
 from gantrytau.commands.printing.spelling import RUNNING, Spelling
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
+MISSING: Any = next(c for c in typer.BadParameter.__subclasses__() if c.__name__ == "MissingParameter")
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
 PLAINLY = {
     "Input should be a valid number, unable to parse string as a number": "expected a number, as 0.5",
@@ -49,7 +52,7 @@ class Commands(TyperGroup):
         if cmd_name not in self.places:
             return None
         if self.listing:
-            return TyperCommand(cmd_name, help=_first_line(self.places[cmd_name][0]))
+            return TyperCommand(cmd_name, help=_first_line(cmd_name, self.places[cmd_name][0]))
         if cmd_name not in self.commands:
             self.commands[cmd_name] = _loaded(cmd_name, *self.places[cmd_name])
         return self.commands[cmd_name]
@@ -87,8 +90,16 @@ class Commands(TyperGroup):
                 if sys.stdout is not None:  # it may be closed
                     sys.stdout.flush()
         except USAGE_ERROR as error:
+            begins = any(p.name == "example" for p in error.ctx.command.params) if error.ctx else False
+            if begins and isinstance(error, MISSING) and error.param.param_type_name == "argument":
+                error.message = f"`{error.ctx.command_path} --example` prints one to begin with"
             for said, here in PLAINLY.items():
                 error.message = error.message.replace(said, here)
+            if (
+                " is not one of " in error.message and "did you mean" not in error.message
+            ):  # a group in a group
+                found, *words = re.findall("'([^']*)'", error.message)
+                error.message = error.message.rstrip(".") + (meant(found, words) or ".")
             if not json:
                 raise
             fail(error.format_message(), MISUSE, json)
@@ -129,13 +140,17 @@ def _loaded(name: str, place: str, example: str) -> Any:
     return found
 
 
-def _first_line(place: str) -> str:
-    """What the docstring of a module says behind the name of its command."""
+def _first_line(name: str, place: str) -> str:
+    """The first line of the docstring of a command, or the words of a group; its module is read, not imported."""
     path = Path(__file__).parents[1].joinpath(*place.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
-    words = text.partition("\n")[0].partition(": ")[2]
-    return f"{words[:1].upper()}{words[1:]}"
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    for one in tree.body:
+        if isinstance(one, ast.FunctionDef) and one.name == name:
+            return (ast.get_docstring(one) or "").partition("\n")[0]
+        if isinstance(one, ast.Assign) and isinstance(one.value, ast.Call):  # app = group(words, ...)
+            return ast.literal_eval(one.value.args[0])
+    raise AssertionError(name)
 
 
 def _drop_output() -> None:

@@ -12,7 +12,7 @@ import typer
 
 from gantrytau import GantryTauError
 from gantrytau.border import NotLoaded, python_error, user_lines
-from gantrytau.commands.printing.spelling import RUNNING, spelled
+from gantrytau.commands.printing.spelling import RUNNING, spelled, worded
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
@@ -192,7 +192,7 @@ def noted(kind: type[Warning], told: list[str], json: bool) -> Iterator[None]:
         if not issubclass(category, kind):
             show(message, category, *where, **more)
             return
-        told.append(str(message))
+        told.append(worded(message.args[0] if isinstance(message, Warning) else message))
         if not json:
             note(f"Note: {told[-1]}")
 

@@ -28,8 +28,8 @@ def rehearse(file: Path | None) -> None:
     """Find out before the work whether its result can be saved; CommandError if not."""
     if file is None:
         return
-    trial = file.with_name(f".{file.stem}.trial{file.suffix}")
     with writable(file):
+        trial = file.with_name(f".{file.stem}.trial{file.suffix}")
         try:
             Result([0.0], {"x": 0.0}).save(trial)
         except GantryTauError as error:

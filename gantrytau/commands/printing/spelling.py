@@ -2,13 +2,13 @@
 
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from gantrytau import GantryTauError, Model
-from gantrytau.border import Given, short
+from gantrytau.border import Given, Sentence, short
 
 DOMAINS = ("calibration", "estimation", "identification", "learning", "procedure", "vision")
 # of gantrytau: packages with functions
@@ -43,9 +43,9 @@ class Spelling:
             return option or str(given)
         return f"{option} {shell(given.value)}" if option[0] == "-" else f"{option} = {short(given.value)}"
 
-    def part(self, part: object) -> str:
-        """A part of a sentence."""
-        return self.write(part) if isinstance(part, Given) else str(part)
+    def sentence(self, parts: Iterable[object]) -> str:
+        """Parts of a sentence."""
+        return "".join(self.write(part) if isinstance(part, Given) else str(part) for part in parts)
 
     def message(self, error: GantryTauError) -> str:
         """An error, without its place where that is the function which found it."""
@@ -66,6 +66,11 @@ RUNNING: ContextVar[Spelling] = ContextVar("RUNNING", default=NEUTRAL)  # of the
 def spelled(error: GantryTauError) -> str:
     """An error in the words of the command that runs."""
     return RUNNING.get().message(error)
+
+
+def worded(sentence: str) -> str:
+    """A sentence in the words of the command that runs."""
+    return RUNNING.get().sentence(sentence.parts) if isinstance(sentence, Sentence) else sentence
 
 
 def shell(value: Any) -> str:

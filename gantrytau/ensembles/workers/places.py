@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from time import perf_counter
 from typing import Any
 
-from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.ensembles.cases import Case
 from gantrytau.ensembles.workers.cluster import on_cluster
 from gantrytau.ensembles.workers.processes import in_processes
@@ -23,8 +23,9 @@ def read_place(where: Any) -> Place:
         return where
     hint = did_you_mean(where, NAMES) if isinstance(where, str) else ""
     raise ModelError(
-        f"study: found where={where!r}, expected 'processes', 'dask' or an address, as 'tcp://host:8786'{hint}",
-        argument="where",
+        f"expected 'processes', 'dask' or an address, as 'tcp://host:8786'{hint}",
+        place="study",
+        found=Given("where", where),
     )
 
 

@@ -317,7 +317,7 @@ def _check_inputs(read: SymbolicProblem, experiments: Sequence[Experiment]) -> N
     if missing:
         where, name = missing[0].split(".model.", 1)
         raise ModelError(
-            f"{read.name}: the input {name} of {where} is not known, expected it in Experiment(inputs={{'{name}': ...}})",
+            f"{read.name}: the input {name} of {where} is not known, expected it among the inputs of that experiment",
             argument="inputs",
         )
     for experiment in experiments:

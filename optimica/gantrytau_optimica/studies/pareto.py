@@ -129,7 +129,9 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
     name, dae = prepared.built.read.name, prepared.built.read.dae
     if not isinstance(what, str):
         raise ModelError(
-            f"along {label}: found {what!r}, expected a name or a function of an Optimum", argument="along"
+            f"{label}: found {what!r}, expected a name or a function of an Optimum",
+            place="along",
+            argument="along",
         )
     free = {n.name for n in prepared.built.problem.free if not n.held}
     if what in free:
@@ -141,7 +143,8 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
         elements = dae.expand(inner)
         if len(elements) != 1:
             raise ModelError(
-                f"along {label}: {inner} has {len(elements)} elements, expected one; name it",
+                f"{label}: {inner} has {len(elements)} elements, expected one; name it",
+                place="along",
                 argument="along",
             )
         if kind == "integral":
@@ -149,13 +152,16 @@ def _quantity(prepared: Prepared, label: str, what: Any, known: Mapping[str, str
         return (lambda o: float(o.final(elements[0]))), known.get(inner, "")
     if what in dae.variables or what in dae.vectors:
         raise ModelError(
-            f"along {label}: {what} varies over time, expected a number; write 'final({what})' or 'integral({what})'",
+            f"{label}: {what} varies over time, expected a number; write 'final({what})' or 'integral({what})'",
+            place="along",
             argument="along",
         )
     over_time = (f"{k}({n})" for n in dae.variables for k in ("integral", "final"))
     choices = [*free, "final_time", "objective", *over_time]
     raise ModelError(
-        f"along {label}: {name} has no quantity '{what}'{did_you_mean(what, choices)}", argument="along"
+        f"{label}: {name} has no quantity '{what}'{did_you_mean(what, choices)}",
+        place="along",
+        argument="along",
     )
 
 
@@ -164,7 +170,8 @@ def _value(label: str, quantity: Quantity, optimum: Optimum) -> float:
         value = float(quantity(optimum))
     except USERS_ERRORS as error:  # of a function that is not ours
         raise ModelError(
-            f"along {label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number",
+            f"{label}: {type(error).__name__}: {error}; expected a function from an Optimum to a number",
+            place="along",
             argument="along",
         ) from error
     return value

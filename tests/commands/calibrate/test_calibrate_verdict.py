@@ -177,7 +177,7 @@ def test_what_was_measured_in_the_base_is_right_there(folder, answer, off, words
     assert found["notes"] == [found["notes"][0]]
     assert found["notes"][0].startswith(f"target: positions in the base of the robot are those of {words}")
     assert found["transformation"] is None
-    ends = "its coordinates are as good as this." if said else "says that it is."
+    ends = "its coordinates are as good as this." if said else "--frame base says that it is."
     assert found["verdict"].endswith(ends)
     assert ("good up to a frame" in found["verdict"]) != bool(said)
 
@@ -205,7 +205,7 @@ def test_a_fitted_frame_says_what_it_means_for_the_base(folder, answer, run):
     refused = run("calibrate", file, "--frame", "base")
     assert refused.exit_code == FAULT
     assert "m off the poses of the plan beside it in the median, expected 0.025 m at most" in refused.stderr
-    assert "fitted" in refused.stderr
+    assert "take --frame fitted for another frame" in refused.stderr
 
 
 def test_a_cell_says_in_which_frame_its_device_measures(folder, answer, fails):

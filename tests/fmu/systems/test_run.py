@@ -133,8 +133,9 @@ def test_files_that_cannot_be_run(lag, tmp_path):
 
 def test_inputs_that_nothing_drives_are_a_note(lag, tmp_path):
     found = run(lag, "--stop", 1)
-    assert found.stderr.startswith(
-        "Note: nothing drives 1 input, which keeps its value: u = 0; give it with "
+    assert (
+        found.stderr
+        == "Note: nothing drives 1 input, which keeps its value: u = 0; give it with --input or --set\n"
     )
     printed = run(lag, "--stop", 1, "--json")
     assert printed.stderr == ""

@@ -224,15 +224,15 @@ def test_what_is_written_wrongly_is_said():
 @pytest.mark.parametrize(
     ("along", "words"),
     [
-        (["energy"], r"along energy: Gentle has no quantity 'energy'"),
+        (["energy"], r"along: energy: Gentle has no quantity 'energy'"),
         (["final_tme"], r"no quantity 'final_tme'; did you mean 'final_time'"),
         (["square"], r"square varies over time, expected a number; write 'final\(square\)' or"),
-        (["final(pair)"], r"along final\(pair\): pair has 2 elements, expected one; name it"),
+        (["final(pair)"], r"along: final\(pair\): pair has 2 elements, expected one; name it"),
         (["integral(nothing)"], "no variable or parameter 'nothing'"),
-        ({"a": 3.0}, "along a: found 3.0, expected a name or a function of an Optimum"),
+        ({"a": 3.0}, "along: a: found 3.0, expected a name or a function of an Optimum"),
         ("final_time", "along='final_time', expected a list of quantities or"),
         ([], r"along=\[\], expected a list of quantities"),
-        ({"a": lambda o: o["nothing"]}, r"along a: ModelError: .*expected a function from an Optimum to a"),
+        ({"a": lambda o: o["nothing"]}, r"along: a: ModelError: .*expected a function from an Optimum to a"),
     ],
 )
 def test_quantities_written_wrongly_are_said(along, words):

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from gantrytau import GantryTauError
+from gantrytau.border import Given, Sentence
 from gantrytau.border.checks import number
 from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.assessment.cross_validation import CrossValidation, held_out
@@ -88,15 +89,15 @@ def _of_frame(found: Calibration | NamedCalibration, good: bool, tape: float) ->
         )
     holds = "This is good up to a frame" if good else "This holds up to a frame"
     if found.motion is None:
-        return (
-            f"{holds}: coordinates are those of the frame measured, taken for the base of the robot; frame='base' says that "
-            "it is."
-        )
+        taken = f"{holds}: coordinates are those of the frame measured, taken for the base of the robot; "
+        return Sentence(taken, Given("frame", "base"), " says that it is.")
     before = expected_error(found, tape=tape, noise=NOTHING_MEASURED)
-    return (
+    return Sentence(
         f"{holds}: R and t follow from nominal values, so that in coordinates of the base the tool may be off by "
         f"{length_text(before.error)}, as before, where these are {length_text(tape)} off; measure in the base of the robot "
-        "and take frame='base' to know it there."
+        "and take ",
+        Given("frame", "base"),
+        " to know it there.",
     )
 
 

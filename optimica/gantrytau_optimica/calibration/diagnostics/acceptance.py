@@ -239,8 +239,8 @@ def not_converged(found: FittedNumbers) -> Iterator[Finding]:
     """The finding on a fit without convergence."""
     if not found.success:
         words = (
-            "the fit did not converge; its numbers are those of the last step; measure more poses, or give "
-            "prior={name: deviation}"
+            "the fit did not converge; its numbers are those of the last step; measure more poses, or give ",
+            Given("prior"),
         )
         yield Finding("not converged", found.rows, words)
 
@@ -299,7 +299,8 @@ def _undetermined(found: FittedRods) -> Iterator[Finding]:
         names = ", ".join(_whole_vectors(found.undetermined))
         words = (
             f"data do not hold {names} (rank {found.rank} of {len(found.names)}); they stay near their start values; "
-            f"{advice}, or give prior={{name: deviation}}"
+            f"{advice}, or give ",
+            Given("prior"),
         )
         yield Finding("undetermined", found.rows, words)
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from gantrytau import SolveError
+from gantrytau.border import Given
 from gantrytau_optimica.calibration.fitting.constraints import AT_LIMIT, ParameterConstraint, read_constraints
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.calibration.fitting.symbolic_closure import errors_of
@@ -61,17 +62,18 @@ def _solved(fit: Fit, constraints: Sequence[ParameterConstraint]) -> Fit:
             np.concatenate([getattr(each, side) for each in constraints]) for side in ("low", "high")
         )
         start, exact = np.zeros(len(free)), {"ipopt.bound_relax_factor": 0.0}  # limits hold as they are said
-        remedy = "that keeps the constraints; look whether they contradict each other"
+        remedy = [" that keeps the constraints; look whether they contradict each other"]
     else:
         kept, low, high, exact = lost, np.zeros(lost.numel()), np.zeros(lost.numel()), {}
         start = np.linalg.solve(steps, group.x[free] - middle)
         start[rank:] = 0.0
-        remedy = "; take method='gauss-newton', or start='linear'"
+        remedy = ["; take ", Given("method", "gauss-newton"), ", or ", Given("start", "linear")]
     solver = _solver(rows, unknown, kept, bool(group.arms), OPTIONS | exact)
     found, stats = solver(x0=start, lbg=low, ubg=high), solver.stats()
     if not (stats["success"] or stats["return_status"] in AT_ROUNDING):
         raise SolveError(
-            f"Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a minimum{remedy}",
+            f"Ipopt ended with {stats['return_status']} after {stats['iter_count']} iterations, expected a minimum",
+            *remedy,
             place="calibrate",
         )
     parameters = group.x.copy()

@@ -87,10 +87,8 @@ def check_model(model: object, robot: NominalRods, measurements: Measurements) -
         raise refused(message, Given("model", 1))
     rails = 0 if measurements.rails is None else len(measurements.rails)
     if needs_rails(model) and rails != len(robot.arms):
-        message = (
-            f"expected measured points of all {len(robot.arms)} guideways, not {rails}; give rails=[...] in "
-        )
-        raise refused(f"{message}Measurements, or take ", Given("model", 1 if model == 2 else 3))
+        message = f"expected measured points of all {len(robot.arms)} guideways, not {rails}; give them by "
+        raise refused(message, Given("rails"), ", or take ", Given("model", 1 if model == 2 else 3))
 
 
 def nominal_links(robot: NominalRods, data: Measurements, all_links: bool) -> list[ModelLink]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau import Model, ModelError, flatten
+from gantrytau.border import Given
 from gantrytau.compiler.parameters import parameter_table
 from gantrytau.describing.record import Record
 from gantrytau.flattening.instantiation import instantiate
@@ -61,14 +62,17 @@ def read_nominal(robot: Any) -> NominalRods:
     """The nominal rods of a model instance; ModelError for what is none, or says nothing of rods."""
     if not isinstance(robot, Model):
         raise ModelError(
-            f"calibrate: found {robot!r} as robot, expected a model instance such as GantryTau(prototypes.L1)"
+            f"found {robot!r} as robot, expected a model instance such as GantryTau(prototypes.L1)",
+            place="calibrate",
         )
     rods = rods_of(robot)
     if rods is None or not rods.arms:
         raise ModelError(
-            f"calibrate: found {type(robot).__name__} that does not say what its rods are, expected a robot such as "
-            "GantryTau(prototypes.L1); name what is to be found, parameters=['upper.r'], of any other robot, or give the "
-            "model a method rods() that returns Rods([RodArm(...), ...])"
+            f"found {type(robot).__name__} that does not say what its rods are, expected a robot such as "
+            "GantryTau(prototypes.L1); name what is to be found, ",
+            Given("parameters", ["upper.r"]),
+            ", of any other robot, or give the model a method rods() that returns Rods([RodArm(...), ...])",
+            place="calibrate",
         )
     values = _written(robot, rods.parameters) or _declared(robot, rods) or _flattened(robot, rods)
     return NominalRods(robot, rods, values)

@@ -193,7 +193,7 @@ def guess_of(source: Result | GivenSolution, dae: Dae, component: str = "") -> d
         what = f"none of the variables of {component}" if component else "no variable of the problem"
         raise ModelError(
             f"the given solution has {what}, as {next(iter(dae.states), 'its variables')}; give a solution of the same "
-            "model, or write guess={'component': solution} with the component that it is of",
+            "model, or say of which component it is, as {'component': solution}",
             place="guess",
             argument="guess",
         )

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.border import Given
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.fitting.linear import linear_least_squares
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
@@ -86,9 +87,11 @@ def law_findings(problem: RigidRegression, found: LimitedFit, rows: Sequence[Log
             message = (
                 f"friction of {coordinate} {'rises' if size > 0 else 'falls'} by {abs(size):.3g} towards rest, within about "
                 f"{fall:.2g} m/s or rad/s: that is {explained:.0%} of what is left of its force, and bends friction that "
-                f"was found; take minimum_speed={FALLEN * fall:.2g}, friction='stribeck', or friction=None, the model's law"
+                "was found; take "
             )
-            findings.append(Finding("law of friction", np.arange(0), message))
+            speed = Given("minimum_speed", float(f"{FALLEN * fall:.2g}"))
+            laws = (Given("friction", "stribeck"), ", or ", Given("friction", None), ", the model's law")
+            findings.append(Finding("law of friction", np.arange(0), (message, speed, ", ", *laws)))
     return findings
 
 

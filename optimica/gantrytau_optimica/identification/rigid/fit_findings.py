@@ -56,8 +56,9 @@ def usable_parts(
         ]
     if not kept:
         raise IdentificationError(
-            f"identify: no log lasts {PERIODS} periods of the cutoff of {cutoff:g} Hz, {PERIODS / cutoff:g} s, without gap; "
-            f"log longer, or raise the cutoff. {' '.join(f.message for f in findings)}"
+            f"no log lasts {PERIODS} periods of the cutoff of {cutoff:g} Hz, {PERIODS / cutoff:g} s, without gap; "
+            f"log longer, or raise the cutoff. {' '.join(f.message for f in findings)}",
+            place="identify",
         )
     return kept, findings
 
