@@ -124,8 +124,9 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
 
     describe: a function from a name to words set in parentheses behind it.
     """
-    names = list(names)
-    close = difflib.get_close_matches(wrong, names, n=1, cutoff=0.5)
+    names = list(dict.fromkeys(names))
+    close = [name for name in names if name.lower() == wrong.lower()]
+    close = close or difflib.get_close_matches(wrong, names, n=1, cutoff=0.5)
     if close:
         words = describe(close[0]) if describe else ""
         return f"; did you mean '{close[0]}'{f' ({words})' if words else ''}?"
