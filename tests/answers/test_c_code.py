@@ -66,7 +66,7 @@ def load(source, folder, *names):
     flags = (
         "-std=c99 -pedantic -Werror=implicit-function-declaration -O0 -shared -fPIC"  # -O0 rounds as -O1 does
     )
-    subprocess.run([COMPILER, *flags.split(), "-o", library, path, "-lm"], check=True, timeout=120)
+    subprocess.run([str(COMPILER), *flags.split(), "-o", library, path, "-lm"], check=True, timeout=120)
     return [ca.external(name, str(library)) for name in names]
 
 

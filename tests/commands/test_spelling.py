@@ -1,5 +1,7 @@
 """Errors in the words of a command: options or keys of a file in place of arguments, no name of the function."""
 
+from typing import Any
+
 import pytest
 import typer
 from typer.main import get_command
@@ -10,7 +12,8 @@ from gantrytau.commands.app import app
 from gantrytau.commands.arguments.option import described, serves
 from gantrytau.commands.printing.spelling import Spelling
 
-CALIBRATE = Spelling.of(get_command(app).get_command(None, "calibrate"))
+COMMANDS: Any = get_command(app)
+CALIBRATE = Spelling.of(COMMANDS.get_command(None, "calibrate"))
 PLAN = Spelling().with_names({"wanted": "goal.error", "folder": "--output"})
 
 

@@ -289,7 +289,7 @@ def test_a_translated_model_is_as_good():
         (lambda k: k.replaced({"arms[0].lenght": 2.0}), "did you mean 'arms"),
         (lambda k: k.replaced({"arms[0].length": WORD}), r"arms\[0\].length: found 'small'"),
         (lambda k: k.replaced({"arms[0].offset[1]": [1.0, 2.0]}), r"offset\[1\]"),
-        (lambda k: k.replaced(2.0), "found float as parameters, expected names and their values"),
+        (lambda k: k.replaced(2.0), r"found parameters=2.0, expected \{name: value\}"),
         (lambda k: k.fk_of_five_degrees(np.zeros(6)), "expected a robot with turntables"),
     ],
 )

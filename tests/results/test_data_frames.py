@@ -1,6 +1,7 @@
 """Results, optima and studies as tables of pandas and datasets of xarray: the same numbers, names, units, gaps."""
 
 import sys
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ def motion():
     values = {f"tool.r[{k}]": TIME * (k + 1) for k in range(3)}
     values |= {"phi": TIME * np.pi, "m": 9.13}
     units, words = {"tool.r": "m", "phi": "rad", "m": "kg"}, {"tool.r": "position of the tool"}
-    own = dict(aliases={"opposite": "-phi"}, displays={"phi": "deg"})
+    own: dict[str, Any] = dict(aliases={"opposite": "-phi"}, displays={"phi": "deg"})
     return Result(TIME, values, units=units, descriptions=words, title="motion", **own)
 
 

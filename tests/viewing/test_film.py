@@ -157,7 +157,7 @@ def test_values_that_are_not_finite_are_told():
         (Stick(a=(0.0, 0.0, 0.0), b=(0.0, 0.0)), "found (0.0, 0.0) of shape (2,) in shapes()"),
         (Ball(at="x"), "found 'x' of shape () in shapes(), expected one of shape (3,); a place is the name"),
         (Ball(at=(np.nan, 0.0, 0.0)), "found shapes() = nan, expected finite numbers"),
-        (Stick(a=(0.0, 0.0, 0.0), b=NOTHING), "found shapes() = nan, expected finite"),
+        (Stick(a=(0.0, 0.0, 0.0), b=NOTHING), "found shapes()=None, expected numbers"),
         (Ball(at=AT_X, radius=-1.0), "the model: found the radius or mass -1 of a Ball"),
         (Hinge(at=AT_X, axis=(0.0, 0.0, 0.0)), "found the direction [0, 0, 0] of a Hinge"),
         (Cuboid(at=AT_X, size=(1.0, 1.0, 1.0), R="x"), "of shape () in shapes(), expected one of shape (3"),

@@ -10,13 +10,9 @@ from typing import Any
 from gantrytau import GantryTauError, Model
 from gantrytau.border import Given, short
 
-DOORS = (
-    "",
-    "_fmu",
-    "_fmu.controller",
-    "_optimica",
-    "_optimica.vision",
-)  # of gantrytau: packages with functions
+DOMAINS = ("calibration", "estimation", "identification", "learning", "procedure", "vision")
+# of gantrytau: packages with functions
+DOORS = ("", "_fmu", "_fmu.controller", "_optimica", *(f"_optimica.{name}" for name in DOMAINS))
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ class Stepping(Divider):
 
 
 class Jumping(Held):
+    drive: Any
     source = Step(start_time=1.0)
 
     def equations(self) -> Any:

@@ -1,5 +1,6 @@
 """Tables in FMUs: the motions of simulate, events at the kinks, an end with names."""
 
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
@@ -13,7 +14,8 @@ from gantrytau_fmu import export_fmu
 class Spring(Model):
     """A mass of 1 kg on a spring whose force is a table."""
 
-    kind, outside = "linear", "hold"
+    kind: Any = "linear"
+    outside: Any = "hold"
     xs = np.linspace(-1.5, 1.5, 7)
     m = Parameter(1.0, unit="kg")
     s = Real(unit="m", start=0.0, fixed=True)

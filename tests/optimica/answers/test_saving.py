@@ -85,7 +85,7 @@ class ThereAndOn(Optimization):
 
 
 @cache
-def solved(scheme="radau", **policy):
+def solved(scheme: Any = "radau", **policy: Any):
     return optimize(Warm, elements=8, scheme=scheme, **policy)
 
 

@@ -71,7 +71,7 @@ def design_excitation(
     Y = Y.reshape(-1, len(soft.names))
     log = MotionLog(rows, q, f, v=v, r=motion[:, :3])
     predicted = dict(zip(soft.names, deviations(Y).tolist(), strict=True))
-    start = dict(zip(TOOL, motion[0, :3].tolist(), strict=True))
+    start: dict[str, float] = dict(zip(TOOL, motion[0, :3].tolist(), strict=True))
     by_actuators = motion_regressor(dae, sharp.coordinates, soft.names, SHARP)
     return Excitation(
         dae.name,

@@ -256,7 +256,7 @@ def test_what_does_not_fit_is_refused():
         pose_sensitivities(robot, np.array([[0.0, 0.0, 9.0]]))  # out of reach
     with pytest.raises(ModelError, match="expected Measurements"):
         wrongly(robot, 3)
-    with pytest.raises(ModelError, match=r"found q of shape \(2,\)"):
+    with pytest.raises(ModelError, match=r"found q of"):
         pose_sensitivities(robot, np.zeros(2))
     with pytest.raises(ModelError):
         pose_sensitivities(Pendulum(), poses)

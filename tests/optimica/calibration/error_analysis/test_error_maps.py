@@ -105,7 +105,7 @@ def test_what_is_wrong_is_refused():
         found.plot(layers=0)
     with pytest.raises(ModelError, match="10 positions and 9 errors"):
         error_map(places(10), places(9))
-    with pytest.raises(ModelError, match=r"r of shape \(10, 2\)"):
+    with pytest.raises(ModelError, match=r"r of 10 x 2"):
         error_map(places(10)[:, :2], places(10))
     with pytest.raises(CalibrationError) as caught:
         error_map(places(5), places(5))
