@@ -1,4 +1,4 @@
-"""What translation finds out about a model, in words: `check(model)` and `dae.diagnosis`."""
+"""Findings of translation about a model, in words: `check(model)` and `dae.diagnosis`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -189,7 +189,7 @@ def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translat
 
 
 def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
-    """The same system with the derivatives that are asked for among its unknowns."""
+    """The system with the wanted derivatives among its unknowns."""
     known = {*dae.symbols, *dae.table.symbols, dae.flat.time.name()}
     rows = [n for name in outputs for n in dae.expand(name)]
     if all(leaf.name() in known for n in rows for leaf in ca.symvar(dae.expression(n))):

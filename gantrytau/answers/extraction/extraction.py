@@ -165,7 +165,7 @@ def _roles(dae: Translated, given: Mapping[str, str | Sequence[str]]) -> dict[st
 
 
 def _moved_by_tool(dae: Translated, roles: Mapping[str, Sequence[str]]) -> Translated:
-    """The same model with the motion of the tool known, and as many inputs unknown."""
+    """The model with the motion of the tool known, and as many inputs unknown."""
     roots = {dae.reduced.aliases[n].root for n in roles["f"]}
     others = [n for n in dae.known if n not in roots]
     if len(dae.known) - len(others) != len(roles["f"]):

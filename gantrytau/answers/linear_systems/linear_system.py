@@ -208,5 +208,5 @@ class _Plain(LinearSystem):
 
     @property
     def title(self) -> str:
-        """What it was made of, and its period."""
+        """Origin of the system, and its period."""
         return f"{self._of}, {'continuous' if self.period is None else f'every {self.period:g} s'}"
