@@ -168,7 +168,7 @@ def multisine(
         )
     if not hertz.size or len(set(hertz.tolist())) < hertz.size:
         raise ModelError(
-            "expected one or several different ones; add the amplitudes of those that stand twice",
+            "expected different frequencies, at least one; add the amplitudes of equal ones",
             place="multisine",
             found=Given("frequencies", frequencies),
         )

@@ -113,7 +113,7 @@ def read_tree(file: str | os.PathLike[str]) -> UrdfTree:
             f"{path}: found no file that can be read ({error.strerror}), expected URDF", argument="file"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ModelError(f"{path}: found what is not XML ({error}), expected URDF", argument="file") from None
+        raise ModelError(f"{path}: found no XML ({error}), expected URDF", argument="file") from None
     if b"xacro:" in text:
         raise ModelError(
             f"{path}: found macros of xacro, expected URDF; write it with `xacro {path.name} > robot.urdf`",
