@@ -113,7 +113,7 @@ def left_table(dae: Translated, t: float, table: Range) -> SolveError:
 def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
     """Error: no side of some switches is consistent with the motion after it at time t."""
     words = (
-        f"no side of {' and '.join(conditions)} fits the motion after it: the equations have no solution there, or "
+        f"no side of {' and '.join(conditions)} agrees with what follows from it: the equations have no solution there, or "
         f"the motion would slide along the switch. {SMOOTH} change what jumps; friction that sticks is stick_slip"
     )
     return _at(dae, t, words)
