@@ -28,11 +28,11 @@ from gantrytau.writing import write_equations
 
 
 class Dae(Translated):
-    """A translated model that answers: functions, points, equations, the system of equations. Made by `translate`."""
+    """A translated model, made by `translate`: functions, consistent points, written equations, the equation system."""
 
     @classmethod
     def of(cls, translated: Translated) -> "Dae":
-        """The face of a translated model."""
+        """A Dae of a record of translation."""
         return cls(**{f.name: getattr(translated, f.name) for f in fields(Translated)})
 
     def __describe__(self, name: str = "") -> Description:
@@ -51,11 +51,12 @@ class Dae(Translated):
     ) -> System:
         """The equations as x' = ode(t, x, z, u, p), 0 = residuals(t, x, z, u, p).
 
-        explicit: everything that has a closed form is inserted, z is what has none. lifted: square roots
-        and torn unknowns stay in z with equations of their own, which optimisers prefer. causality, of lifted forms:
-        "inverse" has accelerations in z, from which reactions and inputs follow; "forward" has what is left of solving
-        for them; by default inverse where no closed form leads forwards and less is left. Raises ModelError for
-        "inverse" where inputs and accelerations do not match.
+        form: "explicit" inserts all closed forms, and z has the other unknowns. "lifted" keeps square roots and torn
+        unknowns in z with equations of their own, which optimisers prefer.
+        causality: of the lifted form. "inverse" has accelerations in z, from which reactions and inputs follow; "forward"
+        has the unknowns that remain when the equations are solved for accelerations. The default is "inverse" where there
+        is no closed form forwards and "inverse" leaves fewer unknowns. Raises ModelError for "inverse" where inputs and
+        accelerations do not match.
         """
         return assemble(self, form, causality)
 
@@ -73,30 +74,30 @@ class Dae(Translated):
         """A CasADi function from `given` to `find`, by name; the causality follows from the names.
 
         One argument and one result per name, vectors (k,). Derivatives are `der(x)`, `der(der(x))`.
-        Parameters that are not given have their values. Names `pre(x)` among the given make it the function of an instant:
-        from values just before to those behind one round of the whens whose conditions hold there. Raises StructureError
-        if `given` does not determine `find` or contradicts itself, ModelError for unknown names.
+        Parameters that are not given have their values. With names `pre(x)` among the given it is the function of an
+        instant: from values just before it to values after one round of all whens with true conditions. Raises
+        StructureError if `given` does not determine `find` or contradicts itself, ModelError for unknown names.
         """
         before = any(map(is_before, names(given)))
         return instant_function(self, given, find) if before else function(self, given, find)
 
     def array_function(self, given: Sequence[str], find: Sequence[str]) -> ArrayFunction:
-        """The same for many points at once: arrays (N, k) of what is given to arrays (N, m) of what is found, a row a point.
+        """A function of NumPy arrays from `given` to `find` with a row for each point, arrays (N, k) to arrays (N, m).
 
-        It gives the answers of `function` point by point, which are exact on the branch of the start or NaN, ten to a
-        hundred times sooner; `.jacobian` are its derivatives. Raises what `function` raises.
+        Its answers are those of `function`, exact on the branch of the start or NaN, ten to a hundred times faster;
+        `.jacobian` is its Jacobian. Raises the errors of `function`.
         """
         return ArrayFunction(self, names(given), names(find))
 
     def with_starts(self, starts: Mapping[str, Any]) -> "Dae":
-        """The same from other start values, as `simulate(..., starts=)` takes them, for many runs from there."""
+        """The model with other start values, as `simulate(..., starts=)` takes them, for many runs from these."""
         return self.of(with_starts(self, starts))
 
     def evaluate(self, values: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """All variables and derivatives at a consistent point that holds `values` exactly.
 
-        The rest is completed from the start values. Keys: scalars as float, vectors as arrays, derivatives
-        as `der(x)`; parameters may be given too. Raises InitializationError if there is no such point.
+        Quantities without a value are completed from the start values. values: name -> float or array; derivatives are
+        `der(x)`, and parameters may be given too. Raises InitializationError if there is no such point.
         """
         return evaluate(self, dict(values or {}))
 
@@ -112,10 +113,10 @@ def translate(
 ) -> Dae:
     """Turn a model, flattened or not, into a system of index one, sorted into blocks.
 
-    given: names that are known instead of the declared inputs, as functions of time (parameters named here
-    stay symbols); find: names and derivatives that must be available; states: names preferred as states;
-    units: check the dimensions of all equations; events: accept what is sampled, Discretes that whens set, and
-    friction that sticks, as known after the inputs. Raises ModelError for faults of writing, StructureError if the
+    given: names known as functions of time, in place of the declared inputs (parameters named here stay symbols).
+    find: names and derivatives that must be available. states: names preferred as states. units: check the dimensions
+    of all equations. events: accept sampled variables, Discretes set by whens and sticking friction; they are known, listed
+    after the inputs. Raises ModelError for invalid declarations, StructureError if the
     equations cannot determine the unknowns, InitializationError if no consistent start is found.
     """
     request = Request(names(given), names(find), names(states or ()))

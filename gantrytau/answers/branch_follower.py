@@ -51,7 +51,7 @@ def follow(name: str, residual: ca.Function, start: ca.DM, begin: ca.DM, end: ca
 
 
 def sizes_at(residual: ca.Function, start: ca.DM, begin: ca.DM) -> tuple[ca.DM, ca.DM]:
-    """What rows are divided by and unknowns are measured in, from the Jacobian at the start."""
+    """Scales of rows and unknowns, from the Jacobian at the start."""
     numbers = np.array(ca.Function("jacobian", *_with_jacobian(residual))(start, begin))
     if not np.all(np.isfinite(numbers)):
         return ca.DM.ones(start.numel()), ca.DM.ones(start.numel())

@@ -61,7 +61,7 @@ def composed(
 
 
 def _dropped(dae: Translated, given: Sequence[str]) -> ca.SX:
-    """What must be zero where given parameters could open a loop: the constraints left out as redundant."""
+    """Constraints left out as redundant, which must stay zero where given parameters could open a loop."""
     parameters = any(n in dae.table.symbols for name in given for n in dae.expand(name))
     if not parameters or not dae.redundant:
         return ca.SX(0, 1)
@@ -154,7 +154,7 @@ def _flipped(dae: Translated, given: Sequence[str], find: Sequence[str]) -> Tran
 
 
 def _undetermined(dae: Translated, known: dict[str, ca.SX], targets: list[ca.SX], inputs, given, find) -> str:
-    """What to give as well: the lowest derivatives that suffice, or the inputs of the model."""
+    """Names to give in addition: the lowest derivatives that suffice, or the inputs of the model."""
     unknowns = [n for n in dae.symbols if n not in known]
     driving = [n for n in unknowns if split_derivative(n)[0] in dae.reduced.known]
     text = f"{dae.name}: {', '.join(given) or 'nothing'} does not determine {', '.join(find)}."

@@ -1,4 +1,4 @@
-"""What is said of a translated model: its states, inputs and blocks, and all names with their numbers at the start."""
+"""Description of a translated model: its states, inputs and blocks, and all names with their numbers at the start."""
 
 from collections.abc import Mapping
 
@@ -16,7 +16,7 @@ ROUNDED = 15  # digits behind the point: what is smaller is rounding
 
 
 def dae_described(dae: Translated, name: str = "") -> Description:
-    """What is said of a translated model, or of one variable or parameter; ModelError for a name that is not there."""
+    """Description of a translated model, or of one variable or parameter; ModelError for unknown names."""
     if name:
         return _of_quantity(dae, name)
     flat = dae.flat

@@ -1,4 +1,4 @@
-"""What translation finds out about a model, in words: `check(model)` and `dae.diagnosis`."""
+"""Findings of translation about a model, in words: `check(model)` and `dae.diagnosis`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,15 +33,13 @@ class Moved:
 
 @dataclass(frozen=True)
 class Diagnosis(Record):
-    """What translation found out: sizes, loops, states and their conditioning, blocks, the start.
+    """Structure of a model, found by translation: sizes, loops, states and their conditioning, blocks, start. Prints itself.
 
-    mobility: number of ways in which the positions can change; redundant: equations that repeat others;
-    assumed: parameters of which nobody gave the value, and what it is; moved: start values that were moved, the farthest
-    first; assemblies: where the positions have several solutions, the one taken and others; ambiguous: unknowns of
-    equations that switch on them and hold several solutions at the start, of which the nearest is taken; conditions: of
-    whens, and what is done there; missing: what
-    keeps the model from being translated, else "".
-    Prints itself.
+    mobility: degrees of freedom of the positions; redundant: equations that repeat others; assumed: parameters without a
+    given value, with the value assumed; moved: start values that were moved, the farthest first; assemblies: the assembly
+    taken, and others at the same states; ambiguous: unknowns of switching equations with several solutions at the start,
+    of which the nearest is taken; conditions: conditions of whens with their actions; missing: the fault that prevents
+    translation, else "".
     """
 
     model: str
@@ -105,8 +103,8 @@ def _listed(title: str, items: Sequence[str], always: bool = False) -> list[str]
 def check(model: Model) -> Diagnosis:
     """Examine a model: do its equations determine its unknowns, how can it move, where does it start?
 
-    A model that cannot be translated gets a diagnosis that says in `missing` why not. Raises ModelError for
-    what is written wrongly.
+    The diagnosis of a model that cannot be translated has the reason in `missing`. Raises ModelError for invalid
+    declarations.
     """
     flat: FlatModel | None = None
     try:

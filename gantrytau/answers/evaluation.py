@@ -67,7 +67,7 @@ def evaluate(dae: Translated, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _shares(dae: Translated, values: Mapping[str, float], held: set[str]) -> list[float]:
-    """Where to stop on the way from the start to given positions: after each metre or radian of STEP."""
+    """Intermediate points from the start to given positions: after each metre or radian of STEP."""
     places = [n for n in held if dae.indexed.orders.get(n, 0) > 1]
     free = sum(1 for n in dae.choice.states if dae.indexed.orders.get(n, 0) > 1)
     far = max((abs(values[n] - dae.start[n]) for n in places), default=0.0)

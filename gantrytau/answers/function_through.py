@@ -19,7 +19,7 @@ from gantrytau.compiler.symbol_spaces import column
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What a function is given and what it finds.
+    """Arguments and results of a function.
 
     arguments: one column each; start: gives the numbers of all of them where the model starts; known: (symbol, expression
     of the arguments); targets: columns in symbols of the model; names: of arguments and results.

@@ -79,7 +79,7 @@ def solved_one_by_one(
 
 
 def which_stand_in(expressions: Sequence[ca.SX], known: ca.SX) -> list[int]:
-    """Which of some symbols (k,) expressions hold: a block is not led astray by a NaN that does not matter for it."""
+    """Indices of the known symbols in expressions: a NaN of any other argument must not spoil a block."""
     there = {leaf.name() for leaf in ca.symvar(ca.veccat(*expressions))}
     return [k for k, leaf in enumerate(known.elements()) if leaf.name() in there]
 

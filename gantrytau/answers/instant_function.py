@@ -65,7 +65,7 @@ def _refuse(dae: Translated, given: Sequence[str]) -> None:
         if any(alias.symbol in set_anew for alias in own):
             raise ModelError(
                 f"{dae.name}: found {name} among the given of an instant, which whens set, expected pre({name}), its value "
-                "just before; the one behind is what is asked for"
+                "just before; its value after the instant belongs to the names to find"
             )
 
 

@@ -42,7 +42,7 @@ class Linearization(LinearSystem):
 
     A (n, n), B (n, m), C (k, n), D (k, m), in SI units of the named quantities; states, inputs, outputs: scalar names,
     in the order of rows and columns; point: values of all variables there, by name; period: s, None if continuous;
-    units: by name. What it answers besides stands at `LinearSystem`.
+    units: by name. Poles, responses and figures: see `LinearSystem`.
     """
 
     model: str
@@ -59,7 +59,7 @@ class Linearization(LinearSystem):
 
     @property
     def title(self) -> str:
-        """The model, for figures and messages."""
+        """Title of the linear system in figures and messages."""
         return f"{self.model}, linear" if self.period is None else f"{self.model}, every {self.period:g} s"
 
     def __str__(self) -> str:
@@ -191,7 +191,7 @@ def _with_parameters(dae: Translated, parameters: Mapping[str, Any]) -> Translat
 
 
 def _with_outputs(dae: Translated, outputs: Sequence[str]) -> Translated:
-    """The same system with the derivatives that are asked for among its unknowns."""
+    """The system with the wanted derivatives among its unknowns."""
     known = {*dae.symbols, *dae.table.symbols, dae.flat.time.name()}
     rows = [n for name in outputs for n in dae.expand(name)]
     if all(leaf.name() in known for n in rows for leaf in ca.symvar(dae.expression(n))):

@@ -45,7 +45,7 @@ class Assembly(Record):
 
 
 def assemblies(dae: Translated) -> tuple[Assembly, ...]:
-    """Where the equations of positions have several solutions at the start."""
+    """Position equations with several solutions at the start."""
     units = {n: v.unit for v in dae.flat.variables for n in v.elements}
     found = []
     for block in dae.blocks:

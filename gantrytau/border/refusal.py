@@ -137,7 +137,8 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     describe: a function from a name to words set in parentheses behind it.
     """
     names = list(dict.fromkeys(names))
-    close = difflib.get_close_matches(wrong, names, n=1, cutoff=0.5)
+    close = [name for name in names if name.lower() == wrong.lower()]
+    close = close or difflib.get_close_matches(wrong, names, n=1, cutoff=0.5)
     if close:
         words = describe(close[0]) if describe else ""
         return f"; did you mean '{close[0]}'{f' ({words})' if words else ''}?"

@@ -42,7 +42,7 @@ class Steps(HeldSignal):
 def steps(times: ArrayLike, values: ArrayLike) -> Steps:
     """Steps at times (n,) in s to values (n,), (n, k) or (n, rows, columns), each held until the next; zero before.
 
-    Raises ModelError for what `Samples` refuses: NaN, times that do not rise, shapes that do not fit.
+    Raises ModelError for NaN, times that do not rise, and shapes that do not fit, as `Samples` does.
     """
     return Steps(Samples(times, values, kind="constant"))
 
@@ -88,9 +88,9 @@ class Chirp(SmoothSignal):
 def chirp(low: float, high: float, duration: float, amplitude: float = 1.0, kind: Kind = "linear") -> Chirp:
     """A sine whose frequency goes from `low` at t = 0 to `high` at `duration`, Hz and s; it begins at zero, rising.
 
-    kind: the frequency is linear in time, or its logarithm is. Behind `duration` it goes on with `high`, its value and
-    first derivative continuous. high may be below low. amplitude: in the unit of the input. It is a function of time,
-    which can be differentiated. Raises ModelError for numbers that are not above zero.
+    kind: "linear" or "logarithmic", how the frequency changes in time. After `duration` the sine goes on with the frequency
+    `high`, its value and first derivative being continuous. high may be below low. amplitude: in the unit of the input.
+    The signal is a differentiable function of time. Raises ModelError for numbers not above zero.
     """
     return Chirp(low, high, duration, amplitude, kind)
 
@@ -151,8 +151,8 @@ def multisine(
     frequencies: (n,) in Hz, all different; amplitude: of each, a number or (n,), in the unit of the input. phases:
     "schroeder", phase_k = -2 pi sum over l < k of (k - l) p_l with the shares p of the power, which keeps the peak low
     (Schroeder 1970, IEEE Trans. Inf. Theory 16, eq. 11); "random", by the seed (None: that of the run); or (n,) in rad.
-    It is a function of time, which can be differentiated; over a common period of the frequencies nothing leaks.
-    Raises ModelError for numbers that are not above zero, frequencies that stand twice, and shapes that do not fit.
+    The signal is a differentiable function of time; over a common period of the frequencies its spectrum does not leak.
+    Raises ModelError for numbers not above zero, repeated frequencies, and shapes that do not fit.
     """
     check_seed("multisine", seed)
     given = {"frequencies": frequencies, "amplitude": amplitude}
@@ -168,7 +168,7 @@ def multisine(
         )
     if not hertz.size or len(set(hertz.tolist())) < hertz.size:
         raise ModelError(
-            "expected one or several different ones; add the amplitudes of those that stand twice",
+            "expected different frequencies, at least one; add the amplitudes of equal ones",
             place="multisine",
             found=Given("frequencies", frequencies),
         )

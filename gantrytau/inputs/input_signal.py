@@ -20,13 +20,13 @@ Span = tuple[float, float]  # of time, s
 
 @dataclass(frozen=True)
 class InputSignal:
-    """A signal that tells its course over time, as input of `simulate`, `cosimulate`, `optimize` and `estimate`.
+    """A signal over time, as input of `simulate`, `cosimulate`, `optimize` and `estimate`.
 
-    Signals begin at t = 0. They are records of numbers: two with the same fields are the same course, to the last digit.
+    Signals begin at t = 0. They are records of numbers: signals with equal fields have equal values, to the last digit.
     """
 
     def samples(self, start: float, stop: float) -> Samples:
-        """The course from start to stop, s; exact for what is held, else within 1e-4 of the amplitude.
+        """Samples of the signal from start to stop, s; exact for held signals, else within 1e-4 of the amplitude.
 
         Raises ModelError for a span before t = 0, and for a random signal without seed.
         """
@@ -37,11 +37,11 @@ class InputSignal:
         raise NotImplementedError
 
     def seeded(self, seed: int | None, name: str) -> Self:
-        """The same with a seed of its own, made of the seed of a run and the name of an input, if it needs one."""
+        """The signal with a seed, made from the seed of a run and the name of an input, if it needs one."""
         return self
 
     def shaped(self, shape: tuple[int, ...]) -> Self:
-        """The same for an input of that shape."""
+        """The signal for an input of that shape."""
         return self
 
 

@@ -62,11 +62,12 @@ def white_noise(
     """Gaussian noise: independent numbers of mean zero and standard deviation `std`, each held for `period`, s.
 
     std: in the unit of the input; a number, for each element of an input of several, or an array of its shape. Elements
-    have streams of their own. seed: of NumPy's PCG64; None takes one from the run and the name of the input. The first n
-    numbers are the same however long a run is. One-sided power spectral density at the frequency f: 2 std^2 period
+    have streams of their own. seed: of NumPy's PCG64; None derives one from the seed of the run and the name of the
+    input. The first n numbers do not depend on the length of the run.
+    One-sided power spectral density at the frequency f: 2 std^2 period
     sinc^2(f period), with sinc(x) = sin(pi x) / (pi x): 2 std^2 period well below 1 / period. For a density S of
     continuous white noise take std = sqrt(S / (2 period)), and a period short beside the time constants of the model.
-    Raises ModelError for a std below zero, a period that is not above zero, and a seed that is no whole number.
+    Raises ModelError for a std below zero, a period not above zero, and a seed other than a whole number.
     """
     return WhiteNoise(std, period, seed)
 
@@ -129,9 +130,9 @@ def prbs(bits: int, hold: float, amplitude: float = 1.0, seed: int | None = None
 
     bits: of the shift register, 2 to 31; the sequence repeats after 2^bits - 1 values. In a period the mean is
     amplitude / (2^bits - 1), and the autocorrelation amplitude^2 at no shift, -amplitude^2 / (2^bits - 1) at every other,
-    as near to white as two values come. seed: where in the period it begins, by NumPy's PCG64; None takes one from the
-    run and the name of the input. amplitude: in the unit of the input.
-    Raises ModelError for other bits, a hold or an amplitude that is not above zero, and a seed that is no whole number.
+    the whitest spectrum of two values. seed: chooses the begin within the period, by NumPy's PCG64; None derives one from
+    the seed of the run and the name of the input. amplitude: in the unit of the input.
+    Raises ModelError for other bits, a hold or an amplitude not above zero, and a seed other than a whole number.
     """
     return BinarySequence(bits, hold, amplitude, seed)
 

@@ -20,15 +20,15 @@ SAME = 8  # roundings of a time, within which two times are one: 3 * 0.1 is not 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Samples:
-    """Values of k signals at n times, as an input over time or as what was measured.
+    """Values of k signals at n times, as an input over time or as measurements.
 
-    times: (n,) in s, rising; values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of what they are given
-    for; they are kept as columns, (n, k). kind: between samples "linear", or "constant": each value holds from its time
-    until the next, and the last from then on. deviation: standard deviation of one measured value, a number or of the
-    shape of one or of all samples; 1 where it is not known, which `weighted` tells. unit: of values and deviation, as
-    "mm"; they are kept in SI, and what they are given for has to be measured in it. largest_gap: s, distance of two samples
-    beyond which an estimation takes the course between them for unknown (default: ten times the median distance).
-    Raises ModelError for a unit that is none, for NaN, for repeated or unsorted times, and for shapes that do not fit.
+    times: (n,) in s, rising. values: (n,), (n, k), or (n, rows, columns) of a matrix, in the unit of the quantity; they are
+    kept as columns, (n, k). kind: "linear" between samples, or "constant": each value holds from its time until the next,
+    the last from then on. deviation: standard deviation of a measured value, a number or an array of the shape of one or
+    of all samples; 1 if unknown, see `weighted`. unit: of values and deviation, such as "mm", the quantity being of the
+    same kind; both are kept in SI. largest_gap: distance of two samples, s, beyond which an estimation takes the signal
+    between them for unknown (default: ten times the median distance).
+    Raises ModelError for an unknown unit, NaN, repeated or unsorted times, and shapes that do not fit.
     """
 
     times: Any
@@ -68,7 +68,7 @@ class Samples:
 
     @property
     def weighted(self) -> bool:
-        """Whether deviations were told."""
+        """Whether standard deviations were given."""
         return self.deviation is not None
 
     @cached_property
@@ -93,7 +93,7 @@ class Samples:
         return values
 
     def check_unit(self, place: str, unit: str | None) -> None:
-        """ModelError unless they can be values of a quantity in a unit, if they say theirs."""
+        """Refuse samples with a unit in which a quantity of another unit cannot be measured; ModelError."""
         if self.unit is not None and unit is not None:
             known_scale(place, self.unit, unit)
 
@@ -133,7 +133,7 @@ class Samples:
             ) from None
 
     def check_shape(self, place: str, shape: tuple[int, ...]) -> None:
-        """ModelError unless each sample has the shape of what it is compared with."""
+        """Refuse samples of another shape than the quantity compared with them; ModelError."""
         if not fits(self.shape, shape):
             words = f"found {self.values.shape[1]} columns, expected {int(np.prod(shape))}"
             if len(shape) == 2:
@@ -141,7 +141,7 @@ class Samples:
             raise ModelError(f"{place}: {words}")
 
     def check_cover(self, what: str, start: float, final: float) -> None:
-        """ModelError unless the course is known from start to final, s."""
+        """Refuse samples that do not cover the time from start to final, s; ModelError."""
         small, (first, last) = SMALL * abs(final - start), self.times[[0, -1]]
         if first <= start + small and (last >= final - small or self.kind == "constant"):
             return
@@ -153,7 +153,7 @@ class Samples:
         )
 
     def require(self, what: str, start: float, final: float, between: bool) -> None:
-        """ModelError if samples lie outside of the horizon; with `between`, if they do not cover it or have a gap."""
+        """Refuse samples outside of the horizon, with `between` also a horizon not covered, or gaps; ModelError."""
         small = SMALL * abs(final - start)
         if not between:
             outside = np.flatnonzero((self.times < start - small) | (self.times > final + small))
@@ -176,7 +176,7 @@ class Samples:
             )
 
     def at(self, times: np.ndarray, column: int) -> np.ndarray:
-        """The course of one column between the samples, (m,)."""
+        """Values of one column at times between the samples, (m,)."""
         if self.kind == "linear":
             return np.interp(times, self.times, self.values[:, column])
         within = SAME * np.spacing(np.abs(times))
@@ -184,11 +184,11 @@ class Samples:
         return self.values[row, column]
 
     def jumps(self, column: int) -> np.ndarray:
-        """Times in s at which the course of a column jumps."""
+        """Times in s at which a column jumps."""
         return (
             self.times[1:][np.diff(self.values[:, column]) != 0] if self.kind == "constant" else np.zeros(0)
         )
 
     def kinks(self) -> np.ndarray:
-        """Times in s at which the course is not smooth."""
+        """Times in s at which the signals are not smooth."""
         return self.times[1:-1] if self.kind == "linear" else self.times[1:]

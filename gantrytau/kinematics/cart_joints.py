@@ -49,15 +49,15 @@ class CartJoints(Record):
 
     @property
     def H(self) -> np.ndarray:
-        """What carries the links of each arm, H_1 to H_3, (N, arms, 4, 4)."""
+        """Frames of the carts or turntables that carry the links of each arm, H_1 to H_3, (N, arms, 4, 4)."""
         return np.stack([frames[..., -1, :, :] for frames in self.chain], axis=-3)
 
     def left(self, limit: float) -> np.ndarray:
-        """What each ball joint has left of its largest angle in rad, (N, m, 2); negative beyond it."""
+        """Distance of each ball joint from its largest angle in rad, (N, m, 2); negative beyond it."""
         return number("CartJoints.left", "limit", limit, unit="rad", above=0.0, most=math.pi) - self.ball
 
     def inside(self, limit: float) -> np.ndarray:
-        """Whether all ball joints of a pose keep that largest angle, (N,); False where there is no pose."""
+        """Whether all ball joints of a pose are within a largest angle, (N,); False without a pose."""
         with np.errstate(invalid="ignore"):
             return np.all(self.left(limit) >= 0, axis=(-2, -1))
 
@@ -79,8 +79,8 @@ def cart_joints(
 
     robot: an instance such as F1GantryTau(prototypes.F1), or its Kinematics; q: (N, n) or (n,) in m and rad; r, R: the pose
     of the plate, by default `Kinematics.fk(q)`. cart_axes, plate_axes: mounting axes of the ball joints, (m, 3) or (3,),
-    in axes of what carries them, from cart to plate; by default along the links in the home pose. Where there is no pose,
-    what depends on it is NaN. Raises ModelError for robots that are not made of links, and for shapes.
+    in axes of what carries them, from cart to plate; by default along the links in the home pose. Without a pose,
+    quantities depending on it are NaN. Raises ModelError for robots not made of links, and for wrong shapes.
     """
     kinematics = robot if isinstance(robot, Kinematics) else Kinematics(robot)
     linked = kinematics.linked("cart_joints")

@@ -34,13 +34,13 @@ FITS = 1e-6  # m by which links may miss their lengths at the start of a model
 class Kinematics(Record):
     """Kinematics of a robot: a model instance, or what `translate` made of one.
 
-    tool: name of the component whose `.r` (and `.R`) is the pose; joints: names of the actuator coordinates, by default
-    the `s` or `phi` next to each force or torque that drives the model, lengths first; tolerance: m by which links may
-    miss their lengths where ik of a robot with three carts is given an orientation too, and by which a pose may be
-    beside those that a robot with fewer than six joints has.
+    tool: name of the component with the pose `.r` (and `.R`). joints: names of the actuator coordinates, by default the `s`
+    or `phi` beside each driving force or torque, lengths first. tolerance: of poses, m: greatest error of a link length
+    where ik of a robot with three carts is given an orientation too, and greatest distance of a pose from the possible
+    poses of a robot with fewer than six joints.
 
     Poses are r (N, 3) in m and R (N, 3, 3) from plate to world, or one pose without the first axis; q is (N, n) in m and
-    rad. Where there is no solution, or the argument is NaN, rows are NaN. Raises ModelError for arrays of other shapes and
+    rad. Rows without a solution, or with a NaN argument, are NaN. Raises ModelError for arrays of other shapes and
     models without tool or drives.
     """
 
@@ -75,12 +75,12 @@ class Kinematics(Record):
 
     @property
     def home(self) -> Home:
-        """The pose in which the model starts, with `.q .r .R`: it decides the branch."""
+        """Start pose of the model, with `.q .r .R`; it decides the branch."""
         return self._solver.home
 
     @property
     def iterations(self) -> int:
-        """Newton iterations of the last call, the most of any pose; `iterations_by_pose` has them one by one."""
+        """Greatest number of Newton iterations of any pose in the last call; `iterations_by_pose` has them pose by pose."""
         return int(self.iterations_by_pose.max(initial=0))
 
     @property
@@ -91,23 +91,23 @@ class Kinematics(Record):
     def ik(self, r: Any, R: Any = None) -> np.ndarray:
         """Actuator coordinates q (N, n) of poses; (n,) for one.
 
-        Without R the orientation is the one that the links give; the F1 needs one. A link that is too short, or an
-        orientation that three carts cannot give, is a NaN row.
+        Without R the orientation is that given by the links; the F1 needs one. Poses with a link too short, or with an
+        orientation impossible for three carts, are NaN rows.
         """
         at = poses(r, R, "Kinematics.ik")
         q, self.iterations_by_pose = self._solver.ik(at.r, at.R)
         return answered(at.one, q)[0]
 
     def within_a_turn(self, q: np.ndarray, limits: np.ndarray) -> np.ndarray:
-        """Coordinates (N, n) with angles, which a whole turn leaves as they are, nearest to the middle of limits (n, 2)."""
+        """Coordinates (N, n) with whole turns added to angles, which then are nearest to the middle of limits (n, 2)."""
         return self._solver.within_a_turn(q, limits) if isinstance(self._solver, ModelFunctions) else q
 
     def fk(self, q: Any, near: Any = None) -> tuple[np.ndarray, np.ndarray]:
         """Poses r (N, 3), R (N, 3, 3) of actuator coordinates; (3,) and (3, 3) for one.
 
-        near: a position r, or (r, R): the branch near it (three links), or where an iteration starts that takes what it
-        finds, among the poses that ik answers with q. By default the branch of the start of the model, NaN where there is
-        nothing on it: tool on the other side of the carts, or links that cross.
+        near: a position r, or (r, R). It chooses the branch of a robot with three links; for others it is the first iterate,
+        and any pose found is returned for which ik gives q. By default poses are on the branch of the start of the model,
+        NaN where this branch has none: tool on the other side of the carts, or links that cross.
         """
         q, one = vectors(q, len(self.joints), "q", "Kinematics.fk")
         if near is not None:
@@ -125,7 +125,7 @@ class Kinematics(Record):
         return answered(at.one, self._solver.jacobian(at.r, at.R))[0]
 
     def rates(self, r: Any, R: Any = None) -> np.ndarray:
-        """How joints move the tool: its velocity by their rates, (N, 3, n); with R its angular velocity besides, (N, 6, n).
+        """Jacobian from joint rates to tool velocity, (N, 3, n), or with R to velocity and angular velocity, (N, 6, n).
 
         Velocities are resolved in the world. Infinite or NaN in singular poses and out of reach.
         """
@@ -143,7 +143,7 @@ class Kinematics(Record):
     def variables(self, names: str | Sequence[str], r: Any, R: Any = None) -> list[np.ndarray]:
         """Values of other variables of the model in poses, such as angles of passive joints, (N, k) each; (k,) for one pose.
 
-        Raises ModelError for robots that are computed by their rods: ask `ball_joint_angles`.
+        Raises ModelError for robots computed by their rods, which have `ball_joint_angles` instead.
         """
         at = poses(r, R, "Kinematics.variables")
         if not isinstance(self._solver, ModelFunctions):
@@ -163,12 +163,12 @@ class Kinematics(Record):
 
     @property
     def through_equations(self) -> bool:
-        """Whether its equations answer, as of a robot that does not say by rods() what its links are."""
+        """Whether poses are found by the equations of the model, as for a robot without `rods()`."""
         return isinstance(self._solver, ModelFunctions)
 
     @property
     def turning(self) -> bool:
-        """Whether the joints choose the orientation of the tool too, so that ik is given one."""
+        """Whether the joints also choose the orientation of the tool, so that ik needs one."""
         return self._solver.turning if isinstance(self._solver, ModelFunctions) else len(self.joints) == 6
 
     def ik_of_five_degrees(self, r: Any, R: Any) -> np.ndarray:
@@ -194,8 +194,8 @@ class Kinematics(Record):
 
         Three links: two poses of q, eight q of a pose, for many at once. Six links: one pose at a time; all real
         assembly modes of q, or the q of a pose with every arm on either side of its cart. Any other robot: the q of one pose
-        from many starts, with names such as "+-": a sign for each loop, of an arm in a row for each joint at whose values it
-        is singular and for the rest, "+" as at home. Raises ModelError unless exactly one of q and r is given.
+        from many starts, with names such as "+-": one sign for each loop, of a serial arm one for each joint with singular
+        values and one for the rest; "+" is the sign at home. Raises ModelError unless exactly one of q and r is given.
         """
         if (q is None) == (r is None):
             raise ModelError(
@@ -215,8 +215,8 @@ class Kinematics(Record):
     def state(self, r: Any, R: Any = None, q: Any = None) -> np.ndarray:
         """Configuration state of poses, (N, 4).
 
-        For each arm 1 if it points along its guideway, -1 against, 0 where that is singular; last, 1 if the tool is
-        ahead of the plane of the carts, -1 if behind. q: of that pose, else what ik answers.
+        For each arm 1 if it points along its guideway, -1 against it, 0 in a singular pose; last, 1 if the tool is
+        ahead of the plane of the carts, -1 if behind. q: coordinates of the pose, by default those of ik.
         """
         robot = self.linked("state")
         at, q, R = self._whole(robot, r, R, q, "Kinematics.state")
@@ -245,7 +245,7 @@ class Kinematics(Record):
         return answered(at.one, found)[0]
 
     def replaced(self, parameters: Mapping[str, Any]) -> "Kinematics":
-        """The same robot with other numbers for parameters such as `arms[0].length`, on the same branch.
+        """The robot with other values of parameters such as `arms[0].length`, on the same branch.
 
         Raises ModelError for unknown names or shapes. Quick for Gantry-Tau robots, whose model is not translated anew.
         """
@@ -263,7 +263,7 @@ class Kinematics(Record):
         return found
 
     def linked(self, what: str = "links") -> RodRobot:
-        """The robot as guideways and links; ModelError for a model that is not made of them."""
+        """The robot as guideways and links; ModelError for a model of other parts."""
         if isinstance(self._solver, RodRobot):
             return self._solver
         raise ModelError(

@@ -28,10 +28,10 @@ class TurntableScrew:
     """A ball screw between a pivot on what carries a turntable and one on the turntable, free of play.
 
     base: OP, crank: OQ, distances of the pivots of spindle and nut from the axis, m; angle: from OP to OQ about the axis
-    where the turntable is at 0, between 0 and pi or between -pi and 0, rad; lead: by which a turn of the motor lengthens the
-    screw, m, negative where it shortens it. All methods take numbers or arrays and answer the same shape; NaN beyond the
-    dead centres, where screw and axis are in line and no motor turns the table. Raises ModelError for numbers that make
-    no screw.
+    with the turntable at 0, between 0 and pi or between -pi and 0, rad; lead: lengthening of the screw by a turn of the
+    motor, m, negative for a shortening. All methods take numbers or arrays and return the same shape. Values are NaN beyond
+    the dead centres, in which screw and axis are in line and the motor cannot turn the table. Raises ModelError for
+    impossible dimensions.
     """
 
     base: float
@@ -56,8 +56,8 @@ class TurntableScrew:
     def of_places(cls, *, axis: ArrayLike, base: ArrayLike, nut: ArrayLike, lead: float) -> Self:
         """The screw of pivots at places (3,) in m, in axes whose origin is on the axis (3,) of the turntable, which is at 0.
 
-        Raises ModelError for shapes, pivots on the axis, and pivots that are not in one plane across it: that screw would
-        swing out of its plane.
+        Raises ModelError for wrong shapes, pivots on the axis, and pivots not in one plane across it: that screw would swing
+        out of its plane.
         """
         given = {"axis": axis, "base": base, "nut": nut}
         way, start, end = (array("TurntableScrew.of_places", name, one, (3,)) for name, one in given.items())
@@ -98,7 +98,7 @@ class TurntableScrew:
         return 2 * math.pi / self.lead * longer
 
     def turntable(self, theta: Any) -> np.ndarray:
-        """The angle of the turntable with the motor at theta, rad; NaN where the screw does not get so long or so short."""
+        """The angle of the turntable with the motor at theta, rad; NaN for lengths that the screw cannot have."""
         theta = array("TurntableScrew", "theta", theta, unit="rad", finite=False)
         length = self._length(self.angle) + theta * self.lead / (2 * math.pi)
         with np.errstate(invalid="ignore"):
@@ -110,12 +110,12 @@ class TurntableScrew:
         return (math.copysign(1.0, self.angle) * opening - self.angle)[()]
 
     def lever(self, phi: Any) -> np.ndarray:
-        """The distance h of the screw from the axis, which a force in it acts on, m; its sign is that of `angle`."""
+        """Lever arm h of the screw force about the axis, m; its sign is that of `angle`."""
         opening = self._opening(phi)
         return self.base * self.crank * np.sin(opening) / self._length(opening)
 
     def ratio(self, phi: Any) -> np.ndarray:
-        """How much faster the motor turns than the turntable at phi, and how much less torque it needs; d theta / d phi."""
+        """Gear ratio at phi, d theta / d phi: motor speed by turntable speed, turntable torque by motor torque."""
         return 2 * math.pi / self.lead * self.lever(phi)
 
     def ratio_slope(self, phi: Any) -> np.ndarray:

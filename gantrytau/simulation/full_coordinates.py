@@ -117,7 +117,7 @@ class Coordinates:
 
     @cached_property
     def delayed(self) -> RatesAlong:
-        """What is delayed, and its rates."""
+        """Delayed expressions and their rates."""
         return RatesAlong(self.rounds.past, self.arguments, self.ode, self.algebraic)
 
     def integrator(
@@ -207,13 +207,13 @@ class Coordinates:
         return {}
 
     def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """What was made for a key, made now if it is the first time."""
+        """Cached object of a key, made at its first use."""
         if key not in self.made:
             self.made[key] = make()
         return self.made[key]
 
     def sized(self, sizes: tuple[float, ...]) -> "Coordinates":
-        """The same with other sizes of the states, for a new run."""
+        """These coordinates with other sizes of the states, for a new run."""
         found = replace(self, sizes=sizes, conditioning=self.conditioning.anew())
         found.__dict__["made"] = self.made
         return found

@@ -238,7 +238,7 @@ class Run:
         return found is not None and self._cross(found)
 
     def _courses(self, here: int, count: int) -> np.ndarray:
-        """What the integrator is told of each interval: start, length, number, and the inputs."""
+        """Arguments of the integrator for each interval: start, length, number, and the inputs."""
         trail = self.trail
         h = np.diff(trail.t[here : here + count + 1])
         # nothing changes, so that nothing starts anew
@@ -249,7 +249,7 @@ class Run:
         return np.vstack([trail.t[here : here + count], h, np.arange(count), inputs])
 
     def _gaps(self, places: np.ndarray) -> Margins | None:
-        """How far from its next turn each switch is at successive places."""
+        """Margins of the switches at successive points: distance of each from its next turn."""
         if self.changes.by_time.all_foreseen:
             return None
         return self.coordinates.switches.gaps(self.changes.margins(places), self.changes.modes(places[0]))

@@ -137,7 +137,7 @@ class Integrators:
 
 
 def _later(coordinates: Coordinates, w: np.ndarray, step: float) -> np.ndarray:
-    """What is sampled, held and delayed, (k,), a step later, in s."""
+    """Sampled, held and delayed values, (k,), a step later, in s."""
     half, own = len(coordinates.sampled), coordinates.delay_columns
     if not half and own.stop == own.start:
         return w.copy()

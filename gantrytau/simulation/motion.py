@@ -126,13 +126,13 @@ def _highest_blocks(
 def _divisors(
     solved: SolvedBlocks, pivots: ca.SX, equations: Sequence[Key], unknowns: Sequence[str]
 ) -> list[ca.SX]:
-    """What is divided by where an equation is solved for one unknown."""
+    """Divisors of the equations solved for one unknown."""
     rows, columns = ({key: k for k, key in enumerate(keys)} for keys in (equations, unknowns))
     return [pivots[rows[key], columns[name]] for b in solved.blocks for key, name in b.pairs]
 
 
 def _matrices(solved: SolvedBlocks) -> list[ca.SX]:
-    """What has to be regular, so that blocks of several unknowns determine them."""
+    """Matrices that must be regular, so that blocks of several unknowns determine them."""
     several = [b for b in solved.blocks if len(b.unknowns) > 1 and b.tears]
     return [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in several]
 

@@ -30,7 +30,7 @@ Signal = ca.SX | SampledCourse  # an expression of time, or samples
 
 
 def signal_key(signal: Signal) -> tuple[str, object]:
-    """What makes two signals lead to the same equations."""
+    """Key of a signal: signals with equal keys lead to the same equations."""
     if isinstance(signal, SampledCourse):
         return "samples", None
     return "function", ca.Function("signal", [time], [signal]).serialize()

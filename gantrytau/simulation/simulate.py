@@ -57,27 +57,27 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: s; inputs: name -> number, function of time, `Samples` ((times, values) for short), or a `white_noise`;
-    others keep their start values. Where up to `points` (or 500) samples jump, the result has both sides of the jump.
-    parameters: name -> value; outputs: names to keep (all); tolerance: relative, and absolute in units of a state's
-    `nominal`, of the result (a step of the integrator gets a tenth, and errors of long motions add up). A state without
-    nominal counts as of size 1, or of that of a start below 1e-3; where all states that hang together stay below a
-    thousandth of their sizes, the run is repeated with the sizes seen. points: of the result.
-    starts: name -> other start value, without a new translation: made consistent with the equations as those of the
-    model are, by moving what is not named first; a start that is fixed in the model is fixed at its new value.
-    With other parameters the start is made consistent anew: starts that are not fixed move by as little as it takes, where
-    an FMU keeps the states of its export.
-    max_step: s, the longest step. Without it, steps are short enough for functions of time, of inputs and in the model,
-    that rest and then change for a 10,000th of the run; what is shorter and smooth may be stepped over, and forces along a
-    state that are narrower than a hundredth of its largest value. What switches (`if_else`) is found however often it turns.
-    limits: where a variable that is kept passes its `min` or `max`, "warn" tells it once with its time (DoubtfulResult),
-    "stop" ends the run there as `terminate` does, None does not look.
-    singular: "stop" at a pose where forces are not determined, or "cross" it with the speeds before it, and be warned.
-    Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError
-    when there is no consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables
-    that are not finite although the states are, and of limits that are passed.
-    Whens act where their conditions become true: the result has both sides of such an instant, at two equal times, and
-    `.ended` says what `terminate` said.
+    start, stop: begin and end of the run, s. inputs: name -> number, function of time, `Samples` ((times, values) for
+    short) or a signal such as `white_noise`; other inputs keep their start values.
+    parameters: name -> value, in place of the model's. Starts become consistent anew: those not fixed move as little as
+    possible, whereas an FMU keeps the states of its export.
+    starts: name -> start value, in place of the model's, without a new translation. Quantities without a start given here
+    move first; a start that is fixed in the model is fixed at its new value.
+    outputs: names of the variables to keep, by default all. points: number of output times. The result also has both
+    sides of each event, at two equal times, and of each jump of sampled inputs if these are at most `points` (or 500).
+    tolerance: of the result, relative, and absolute in units of a state's `nominal`; an integrator step gets a tenth of it,
+    and errors of long motions add up. A state without nominal has the size 1, or that of a start below 1e-3. Where all
+    coupled states stay below a thousandth of their sizes, the run is repeated with the sizes seen.
+    max_step: longest step, s. The default resolves functions of time, in inputs and model, that rest and then change during
+    a 10,000th of the run. Shorter smooth changes may be stepped over, and so may forces along a state that are narrower
+    than a hundredth of its largest value. Switches (`if_else`) are located however often they turn.
+    limits: "warn" reports the first passing of a variable's `min` or `max` with its time (DoubtfulResult), "stop" ends the
+    run there as `terminate` does, None does not look.
+    singular: "stop" at a pose with undetermined forces, or "cross" it with the speeds before it and a warning.
+    `.ended` of the result is the text of the `terminate` that ended the run.
+    Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError without a
+    consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables that are not finite
+    although the states are, and of passed limits.
     """
     policy = checked_policy("simulate", locals())
     start, tolerance, max_step = policy["start"], policy["tolerance"], policy["max_step"]

@@ -1,4 +1,4 @@
-"""What is said when a simulation stops before its end."""
+"""Errors of simulations that stop before their end."""
 
 from collections.abc import Sequence
 
@@ -57,7 +57,7 @@ def singular_pose(dae: Translated, t: float, weakest: Sequence[str]) -> SolveErr
 
 
 def sampled_badly(dae: Translated, t: float, name: str) -> SolveError:
-    """What is sampled at time t is not finite."""
+    """Error: a value sampled at time t is not finite."""
     return _stop(dae, t, f"{name} is sampled at t = {t:.6g} s, and its new value is not finite; {NOT_FINITE}")
 
 
@@ -111,7 +111,7 @@ def left_table(dae: Translated, t: float, table: Range) -> SolveError:
 
 
 def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
-    """No sides of conditions agree with what follows from them at time t."""
+    """Error: no side of some switches is consistent with the motion after it at time t."""
     words = (
         f"no side of {' and '.join(conditions)} agrees with what follows from it: the equations have no solution there, or "
         f"the motion would slide along the switch. {SMOOTH} change what jumps; friction that sticks is stick_slip"
@@ -120,7 +120,7 @@ def no_side(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
 
 
 def infinite(dae: Translated, t: float, conditions: Sequence[str], error: Infinite) -> SolveError:
-    """What turns at time t takes more than an impulse."""
+    """Error: a switch at time t would take more than an impulse."""
     jumping, beyond = ", ".join(error.jumping[:4]), ", ".join(error.infinite[:4])
     law = (
         f"jump by impulses that stand in {beyond}, a law that is not linear in them. Make the law linear, or smooth what "
@@ -128,14 +128,14 @@ def infinite(dae: Translated, t: float, conditions: Sequence[str], error: Infini
     )
     place = (
         f"jump at once, for which {beyond} would be infinite, more than an impulse. Expected positions that go on, whose "
-        "speeds may jump: let what is prescribed rise within a time, as by a ramp, or put a spring or damper between"
+        "speeds may jump: let the prescribed quantity rise within a time, as by a ramp, or put a spring or damper between"
     )
     words = f"{' and '.join(conditions)} turns, and {jumping} would {law if error.law else place}"
     return _at(dae, t, words, error.infinite if error.law else [])
 
 
 def undetermined_jump(dae: Translated, t: float, conditions: Sequence[str]) -> SolveError:
-    """The equations behind what turns at time t do not determine what jumps."""
+    """Error: the equations after a switch at time t do not determine the jumps."""
     words = (
         f"{' and '.join(conditions)} turns, and the equations behind it do not determine what jumps, expected a mass or an "
         "inertia for every motion on both sides"
@@ -163,13 +163,13 @@ def accumulating(dae: Translated, t: float, label: str) -> SolveError:
 
 
 def set_badly(dae: Translated, t: float, name: str, labels: Sequence[str]) -> SolveError:
-    """What a when sets at time t is not finite."""
+    """Error: a value set by a when at time t is not finite."""
     words = f"at t = {t:.6g} s the new value of {dae.spoken(name)} is not finite; {NOT_FINITE}"
     return _stop(dae, t, f"{' and '.join(labels)}: {words}", labels)
 
 
 def inconsistent(dae: Translated, t: float, labels: Sequence[str], error: SolveError) -> SolveError:
-    """What a when sets at time t contradicts the constraints."""
+    """Error: values set by a when at time t contradict the constraints."""
     words = (
         f"at t = {t:.6g} s there is no motion with the new values of its states: {error}; {KEPT}: set other states, or "
         "values that the mechanism can reach"
@@ -178,5 +178,5 @@ def inconsistent(dae: Translated, t: float, labels: Sequence[str], error: SolveE
 
 
 def undecided(dae: Translated, t: float, one: When) -> SolveError:
-    """What happens at time t is an error in the words of a when."""
+    """Error at time t with the failure text of a when."""
     return _at(dae, t, one.failure, [one.label])

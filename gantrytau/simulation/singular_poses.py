@@ -45,7 +45,7 @@ Scale = tuple[np.ndarray, np.ndarray, float]  # lengths of rows and columns, and
 
 @dataclass(frozen=True)
 class Look:
-    """What was seen at some points, arrays over them.
+    """Observations at some points, arrays over them.
 
     side: sign of the determinant of the dependent coordinates; distance: smallest singular value of the
     constraints, relative to the first look on the same side of all events; regular: whether accelerations and forces are
@@ -94,7 +94,7 @@ class Conditioning:
         self._scales: dict[bytes, list[Scale]] = {}
 
     def anew(self) -> "Conditioning":
-        """The same for another run, which measures by its own places."""
+        """A copy for another run, which gets scales of its own points."""
         found = copy(self)
         found._scales = {}
         return found
@@ -189,7 +189,7 @@ def _least(matrices: np.ndarray, scale: Scale) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Approach:
-    """What a walk towards a point found.
+    """Result of a walk towards a point.
 
     point: the last one before the singular pose, or the end; distance: there; zero: time at which that distance
     would be zero, s; arrived: whether the end was reached; met: whether a singular point was seen on the way.

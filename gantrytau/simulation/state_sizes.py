@@ -1,4 +1,4 @@
-"""How large the states of a model are: below the tolerance of that, their errors do not count."""
+"""Sizes of the states of a model: errors below the tolerance times the size do not count."""
 
 import math
 from collections.abc import Iterable

@@ -74,7 +74,7 @@ def _held_at(coordinates: Coordinates, names: Sequence[str], times: np.ndarray, 
 
 
 def doubts(result: Result) -> str:
-    """What is to be said of values that are not finite or huge, "" if there are none."""
+    """Warning of values that are not finite or huge, "" without any."""
     found = []
     for name in result.names:
         values = result[name]

@@ -96,7 +96,7 @@ def test_samples_of_smooth_signals_are_near_them(signal):
     ("make", "words"),
     [
         (lambda: chirp(0.0, 1.0, 1.0), "found low=0.0"),
-        (lambda: multisine([1.0, 1.0]), "expected one or several different ones"),
+        (lambda: multisine([1.0, 1.0]), "expected different frequencies"),
         (lambda: multisine([1.0, -1.0]), "found frequencies[1] = -1.0"),
         (lambda: multisine([1.0, 2.0, 3.0], [1.0, 2.0]), "found 2 amplitudes, expected one, or 3"),
         (lambda: multisine([1.0], phases="flat"), "found phases='flat', expected 'schroeder' or 'random'"),

@@ -209,7 +209,7 @@ class Strata:
         return known, tuple(twins)
 
     def _distances(self) -> dict[Key, int]:
-        """How many equations away from a force f each equation is, when all motion is known."""
+        """Distance of each equation from a force f, in equations, when all motion is known."""
         known, _ = self._known(EVERYTHING)
         forces = {s for s in self._known(["f"])[0] if split_derivative(s)[0] not in self.dae.known}
         found: dict[Key, int] = {}

@@ -49,8 +49,8 @@ class Mechanism(Record):
     tool, joints, forces: scalar names, n each, in the order of T, q and f. The functions are CasADi's, vectors (n,), SI:
     constraints(T, q) -> g (n,); velocity_jacobian(T, q) -> J^-1 (n, n); accelerations(T, q, T', q', q'') -> T'';
     M1(T, q), M2(T, q) -> (n, n); G(T, q) -> (n,), gravity and other forces of position; bias(T, q, T', q') -> (n,),
-    friction and products of velocities. M1 belongs to what moves with T, M2 to what moves with q, and a body
-    between them to both. They are meant at positions that satisfy the constraints.
+    friction and products of velocities. M1 has the masses moving with T, M2 those moving with q,
+    and both have a share of a body between them. All functions expect positions that satisfy the constraints.
     """
 
     model: str
@@ -107,8 +107,8 @@ def extract_mechanism(
 ) -> Mechanism:
     """The equations of a mechanism as named functions, extracted from the model.
 
-    tool: names of the tool's coordinates, such as "tool.r"; joints: coordinates of the driven joints; forces: what drives
-    each of them. There are as many of each as the mechanism has degrees of freedom. Other inputs keep their start
+    tool: names of the tool's coordinates, such as "tool.r"; joints: coordinates of the driven joints; forces: driving force
+    of each joint. Each list has as many scalars as the mechanism has degrees of freedom. Other inputs keep their start
     values. Source: Dressler (2012), section 6.3. Raises ModelError for unknown names and counts that do not fit,
     StructureError where tool, joints and forces do not determine each other.
     """
@@ -165,7 +165,7 @@ def _roles(dae: Translated, given: Mapping[str, str | Sequence[str]]) -> dict[st
 
 
 def _moved_by_tool(dae: Translated, roles: Mapping[str, Sequence[str]]) -> Translated:
-    """The same model with the motion of the tool known, and as many inputs unknown."""
+    """The model with the motion of the tool known, and as many inputs unknown."""
     roots = {dae.reduced.aliases[n].root for n in roles["f"]}
     others = [n for n in dae.known if n not in roots]
     if len(dae.known) - len(others) != len(roles["f"]):

@@ -21,7 +21,7 @@ POINTS = 2000
 
 
 class Drawn(Protocol):
-    """What is drawn of a linear system."""
+    """A linear system, as figures need it."""
 
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]

@@ -52,7 +52,7 @@ class LinearSystem(Record):
 
     @property
     def title(self) -> str:
-        """What it is, for figures and messages."""
+        """Title of the system in figures and messages."""
         return "linear system"
 
     @property
@@ -62,7 +62,7 @@ class LinearSystem(Record):
 
     @property
     def zeros(self) -> np.ndarray:
-        """Transmission zeros, complex, sorted like poles: values of s (z) at which some input is not seen at the outputs."""
+        """Transmission zeros, complex, sorted like poles: values of s (or z) at which an input direction has no output."""
         return transmission_zeros(self.A, self.B, self.C, self.D)
 
     @property
@@ -78,8 +78,8 @@ class LinearSystem(Record):
     def response(self, frequencies: Any) -> np.ndarray:
         """The frequency response at frequencies (N,) in Hz, (outputs, inputs, N) complex.
 
-        C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for what are no
-        frequencies, and above half the sampling frequency of a discrete system, where it only repeats itself.
+        C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for invalid
+        frequencies, and for those above half the sampling frequency of a discrete system, where the response repeats.
         """
         hertz = np.atleast_1d(array(self.title, "frequencies", frequencies, (), (None,)))
         half = np.inf if self.period is None else 0.5 / self.period
@@ -91,9 +91,9 @@ class LinearSystem(Record):
         return frequency_response(self.A, self.B, self.C, self.D, points)
 
     def discrete(self, period: float) -> "LinearSystem":
-        """The same from sample to sample, inputs held in between (zero-order hold), exactly.
+        """The exact discrete system for inputs held between samples (zero-order hold).
 
-        period: s. ModelError for a system that is discrete already, or a period that is none.
+        period: s. ModelError for a discrete system, or a period not above zero.
         """
         if self.period is not None:
             words = f"found a discrete system with a period of {self.period:g} s, expected a continuous one; take it as it "
@@ -102,10 +102,10 @@ class LinearSystem(Record):
         return _Plain(self, *held(self.A, self.B, period), period)
 
     def continuous(self) -> "LinearSystem":
-        """The continuous system that this one is from sample to sample with inputs held: the inverse of `discrete`.
+        """The continuous system with these samples under held inputs: the inverse of `discrete`.
 
-        Modes are taken to be below half of the sampling frequency. ModelError for a system that is continuous already, and
-        for a pole at zero or on the negative real axis, which no continuous system of this order has.
+        Modes are assumed below half the sampling frequency. ModelError for a continuous system, and for a pole at zero or
+        on the negative real axis, which no continuous system of this order has.
         """
         if self.period is None:
             raise ModelError(f"{self.title}: found a continuous system, expected one with a period")
@@ -132,8 +132,8 @@ class LinearSystem(Record):
         """Outputs (N, outputs) to samples of the inputs.
 
         u: of a discrete system (N, inputs), one row every period; of a continuous one (times (N,), values (N, inputs)),
-        joined by straight lines, and the outputs are those of these times, exactly. (N,) will do for one input.
-        x: the state at the first sample, (n,), else zero. Of a linearization all are differences from its point.
+        joined by straight lines; outputs are exact at these times. (N,) will do for one input.
+        x: the state at the first sample, (n,), else zero. Of a linearization all values are differences from its point.
         """
         name = f"{self.title}.simulate"
         start = np.zeros(len(self.A)) if x is None else array(name, "x", x, (len(self.A),))
@@ -162,9 +162,9 @@ class LinearSystem(Record):
     ) -> "Figure":
         """Gain and phase over frequency in Hz, each output over each input; saved to `file` if one is named.
 
-        frequencies: (N,) in Hz, else around all poles and zeros. beside: other systems of as many outputs and inputs by
-        their names, and spectra that were measured, which have `hertz` (N,) and a complex `response` (outputs, inputs, N).
-        ModelError for others of another shape.
+        frequencies: (N,) in Hz, else around all poles and zeros. beside: name -> another system with as many outputs and
+        inputs, or a measured spectrum with `hertz` (N,) and a complex `response` (outputs, inputs, N).
+        ModelError for systems and spectra of another shape.
         """
         systems = bode_and_poles.beside_each_other(self, "plot_bode", beside, spectra=True)
         return bode_and_poles.draw_bode(self, bode_and_poles.curves_of(systems, frequencies), file)
@@ -208,5 +208,5 @@ class _Plain(LinearSystem):
 
     @property
     def title(self) -> str:
-        """What it was made of, and its period."""
+        """Origin of the system, and its period."""
         return f"{self._of}, {'continuous' if self.period is None else f'every {self.period:g} s'}"

@@ -51,7 +51,7 @@ def in_s(poles: np.ndarray, period: float | None) -> np.ndarray:
 def _balanced(
     A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The same system with states, inputs and outputs measured so that units count little; zeros stay."""
+    """The system with balanced units of states, inputs and outputs; its zeros do not change."""
     from scipy.linalg import matrix_balance
 
     n = len(A)

@@ -1,4 +1,4 @@
-"""What linear systems answer: over frequency, and over time to samples."""
+"""Responses of linear systems: over frequency, and over time to samples."""
 
 import numpy as np
 

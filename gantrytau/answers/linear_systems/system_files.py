@@ -16,7 +16,7 @@ MATRICES = ("A", "B", "C", "D")
 
 
 class Saved(Protocol):
-    """What is known of a system that is saved."""
+    """Content of a saved system."""
 
     A: np.ndarray
     B: np.ndarray

@@ -147,7 +147,7 @@ class ArrayProgram:
 
 
 def _places(pattern: ca.Sparsity) -> list[int]:
-    """Where nonzeros stand in the matrix, column after column."""
+    """Indices of the nonzeros in the matrix, column after column."""
     return [r + c * pattern.size1() for r, c in zip(pattern.row(), pattern.get_col(), strict=True)]
 
 

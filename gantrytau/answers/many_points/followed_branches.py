@@ -88,7 +88,7 @@ class FollowedBranch:
 
     @cached_property
     def _turning(self) -> np.ndarray:
-        """Which unknowns are angles: a whole turn leaves the residual as it is, (n,)."""
+        """Whether each unknown is an angle, (n,): a whole turn does not change the residual."""
         n = len(self.start)
         beside = self.start + np.random.default_rng(0).uniform(-1, 1, n)
         y = beside[:, None] + 2 * np.pi * np.eye(n, n + 1)
@@ -139,7 +139,7 @@ class FollowedBranch:
 
     @cached_property
     def units(self) -> tuple[np.ndarray, np.ndarray]:
-        """What rows are divided by and unknowns are measured in."""
+        """Scales of rows and unknowns."""
         sizes = one.sizes_at(self.residual, ca.DM(self.start), ca.DM(self.begin))
         rows, columns = (np.array(size).ravel() for size in sizes)
         return rows, columns

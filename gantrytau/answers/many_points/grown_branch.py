@@ -55,7 +55,7 @@ class GrownBranch:
 
     @property
     def _spread(self) -> np.ndarray:
-        """How far known arguments lie apart, (k,)."""
+        """Ranges of the known arguments, (k,), 1 where they are all equal."""
         spread = np.ptp(self.known[: self._count], axis=1)
         return np.where(spread > 0, spread, 1.0)
 

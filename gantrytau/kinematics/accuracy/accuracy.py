@@ -40,14 +40,14 @@ _PASSES = 20  # three suffice where the links are not in one plane
 
 @dataclass(frozen=True, eq=False)
 class Accuracy(Record):
-    """Errors of the tool in N poses. Rows are NaN where the tool is out of reach; where links are so nearly in one plane
-    that errors pull them apart, corners are NaN and error and bound infinite.
+    """Errors of the tool in N poses. Rows out of reach are NaN. Where links are almost in one plane, so that errors pull
+    them apart, corners are NaN and error and bound infinite.
 
     r: tool (N, 3) in m; carts: A_i (N, 3, 3) in m; lengths: (3,) in m; semi_axes: r_ij (3, 3) in m.
     corners: the corners of the printed region (A.2), places in the world, (N, 8, 3) in m; the order is that of
     SIGNS, -1 for the inner and 1 for the outer ellipsoid of each arm.
-    error: largest distance of a corner from the tool, (N,) in m. bound: what no error inside the ellipsoids
-    exceeds, (N,) in m. half_widths: h_i (N, 3) in m. areas: faces of the parallelepiped, those orthogonal to link i
+    error: largest distance of a corner from the tool, (N,) in m. bound: upper bound of errors from inside
+    the ellipsoids, (N,) in m. half_widths: h_i (N, 3) in m. areas: faces of the parallelepiped, those orthogonal to link i
     in column i, (N, 3) in m2. directions: unit vectors u_i from tool to carts, (N, 3, 3). passes: iterations of A.2.
     """
 
@@ -80,7 +80,7 @@ class Accuracy(Record):
     def dihedral_angles(self) -> np.ndarray:
         """Angles at links 1, 2 and 3 between the planes through it and either other link, (N, 3) in rad (beta_k of A.4).
 
-        The sides of the face orthogonal to a link meet at this angle, and at what it leaves of pi.
+        The sides of the face orthogonal to a link meet at this angle and at its supplement.
         """
         u = self.directions
         sides = cross(u, u[:, [1, 2, 0]]), cross(u, u[:, [2, 0, 1]])
@@ -89,7 +89,7 @@ class Accuracy(Record):
     def sampled(self, samples: int = 1000, *, seed: int = 0) -> np.ndarray:
         """Displacements of the tool for random errors on the ellipsoids, (N, samples, 3) in m: the Monte Carlo check.
 
-        Where the links meet is computed for displaced carts without any approximation; the same errors in every pose.
+        The meeting point of the links is computed exactly for displaced carts; errors are the same in every pose.
         """
         whole("sampled", "samples", samples, least=1)
         random = np.random.default_rng(seed).normal(size=(samples, 3, 3))

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class JointErrors(Record):
-    """Errors of the tool in N poses, to first order; rows are NaN out of reach and in singular poses.
+    """Errors of the tool in N poses, to first order. Rows out of reach and in singular poses are NaN.
 
     r (N, 3) m, R (N, 3, 3) or None where the joints do not choose it, q (N, n); errors: the largest of each joint, (n,) in
     m and rad. rates: velocity of the tool by rates of the joints, (N, 3, n), and with R its angular velocity, (N, 6, n).

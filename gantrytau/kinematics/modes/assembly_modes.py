@@ -25,14 +25,14 @@ class AssemblyModes(Record):
     """The modes of a hexapod: real ones first, those of one group together; complex ones in conjugate pairs.
 
     r: (k, 3), position of the platform, in m; R: (k, 3, 3), its rotation; complex both, real ones without
-    imaginary part. real, regular: (k,); singular modes are where several meet, or where the links do not hold the
-    platform, and known to some 1e-6 only. complete: all 40 are there. error: (k,), what links are wrong by, in m:
+    imaginary part. real, regular: (k,); singular modes, in which several meet or the links do not hold the
+    platform, are known to some 1e-6 only. complete: all 40 modes were found. error: (k,), error of the link lengths, in m:
     rounding, of real modes some 1e-16, of complex ones far away 1e-16 |r|^2 / L; `exact` has the same modes with `.r .R
     .error` in the longest numbers of the machine (np.clongdouble), on x86 with 1e-12 m up to some 500 m away.
     feasible: (k,), real, no links crossed, links `diameter` apart; crossed: pairs of links per mode; clearance:
     (k,), least distance of two links, in m, NaN for complex modes. group: (k,), 1 or -1, side of the plane
     through the base joints, 0 for complex modes; the largest component of its normal is positive. sign: (k,), 1 or
-    -1: between modes of different signs lies a singular pose; 0 for complex modes. findings: what is special.
+    -1: between modes of different signs lies a singular pose; 0 for complex modes. findings: special cases met.
     """
 
     r: np.ndarray

@@ -35,9 +35,9 @@ SAME = 1e-6  # m, of the joints on the plate in a mode that the robot's own kine
 class AssemblyStudy(Record):
     """The modes of each row, a robot at actuator coordinates; prints itself as a table.
 
-    names: of the robots; robot: (N,), which of them a row is of; q: (N, n), m and rad; modes: the record of
-    `assembly_modes` of each row, real modes first; branch: (N,), which mode `Kinematics.fk` answers, -1 where it answers
-    none; angles: for each row the largest angle of a ball joint in each real mode, (k,) in rad, from axes along the links in
+    names: of the robots; robot: (N,), index of the robot of each row; q: (N, n), m and rad; modes: the record of
+    `assembly_modes` of each row, real modes first; branch: (N,), index of the mode given by `Kinematics.fk`, -1 without
+    one; angles: for each row the largest angle of a ball joint in each real mode, (k,) in rad, from axes along the links in
     the home pose. Rows are all poses of the first robot, then those of the next one.
     """
 
@@ -75,12 +75,12 @@ class AssemblyStudy(Record):
 
     @cached_property
     def counts(self) -> np.ndarray:
-        """How many modes are real, (N,)."""
+        """Number of real modes, (N,)."""
         return np.array([int(found.real.sum()) for found in self.modes])
 
     @cached_property
     def feasible(self) -> np.ndarray:
-        """How many of them have no crossed links, and links as far apart as `diameter` asks, (N,)."""
+        """Number of real modes without crossed links, and with links `diameter` apart, (N,)."""
         return np.array([int(found.feasible.sum()) for found in self.modes])
 
     @cached_property
@@ -90,29 +90,29 @@ class AssemblyStudy(Record):
 
     @cached_property
     def groups(self) -> np.ndarray:
-        """How many real modes lie on the one side of the plane through the joints on the carts, and on the other, (N, 2)."""
+        """Number of real modes on either side of the plane through the joints on the carts, (N, 2)."""
         return np.array([[int((found.group == side).sum()) for side in (1, -1)] for found in self.modes])
 
     def within(self, limit: float) -> np.ndarray:
-        """How many real modes have no ball joint beyond an angle in rad, (N,): those that the robot could be in."""
+        """Number of real modes with all ball joints within an angle in rad, (N,): the modes possible for the robot."""
         limit = number("within", "limit", limit, unit="rad", above=0.0, most=np.pi)
         return np.array([int((angles <= limit).sum()) for angles in self.angles])
 
     @property
     def histogram(self) -> dict[int, int]:
-        """How many poses have so many real modes, by the number of modes."""
+        """Number of poses for each number of real modes."""
         numbers, poses = np.unique(self.counts, return_counts=True)
         return dict(zip(numbers.tolist(), poses.tolist(), strict=True))
 
     @cached_property
     def nearest(self) -> np.ndarray:
-        """Between the two real modes of a pose that are nearest to each other, (N,) in m, see `distances`; NaN below two."""
+        """Distance of the two nearest real modes of a pose, (N,) in m, see `distances`; NaN for fewer than two."""
         found = np.array([self._gaps(row).min(initial=np.inf) for row in range(len(self))])
         return np.where(self.counts < 2, np.nan, found)
 
     @cached_property
     def to_next(self) -> np.ndarray:
-        """From the mode that the robot is in to the nearest other one, (N,) in m; NaN where either is not there."""
+        """Distance from the mode of the robot to the nearest other real mode, (N,) in m; NaN without one of the two."""
         found = [self._gaps(row)[k].min() if k >= 0 else np.nan for row, k in enumerate(self.branch)]
         return np.where(self.counts < 2, np.nan, found)
 
@@ -123,7 +123,7 @@ class AssemblyStudy(Record):
         return found
 
     def distances(self, row: int = 0) -> np.ndarray:
-        """Between the real modes of a row, (k, k) in m: the root of the mean square way of the joints on the plate."""
+        """Distances between the real modes of a row, (k, k) in m: root mean square displacements of the plate's joints."""
         r, R = self.modes[self._row(row)].poses
         joints = r[:, None] + self._geometries[self.robot[row]].on_plate @ np.swapaxes(R, 1, 2)
         return np.sqrt(((joints[:, None] - joints) ** 2).sum(-1).mean(-1))
@@ -135,7 +135,7 @@ class AssemblyStudy(Record):
     def plot_modes(self, row: int = 0, *, file: FileName | None = None) -> "Figure":
         """The robot in each real mode of a row, links that cross in red (Figure 4.18).
 
-        Raises ModelError for a row that there is not, or that has no real mode.
+        Raises ModelError for a row out of range or without a real mode.
         """
         modes = self._with_modes(row)
         captions = [

@@ -23,8 +23,8 @@ SIDES = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
 class Configuration(Record):
     """One solution: q (N, n), r (N, 3), R (N, 3, 3) and feasible (N,), or one pose without the first axis.
 
-    feasible: it exists, within the bounds that the model declares, and no two links cross. name: of a robot through its
-    equations.
+    feasible: the solution exists, keeps the bounds of the model, and no two links cross. name: signs of its branch, for
+    robots computed by their equations.
     """
 
     q: np.ndarray

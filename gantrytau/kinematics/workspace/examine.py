@@ -12,11 +12,11 @@ from gantrytau.language.model import Model
 def examine(
     robot: Model | Kinematics, r: ArrayLike, R: ArrayLike | None = None, limits: Limits | None = None
 ) -> Examined:
-    """Which poses of a robot keep all limits, and what they leave of each.
+    """Poses of a robot beside its limits: which keep all, and how far each limit is away.
 
     robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; r: (N, 3) or (3,) in m; R: (N, 3, 3), one
     (3, 3) for all, or None for the orientation that the links give, and for a robot that turns its tool that of its start.
-    Raises ModelError for what is no such robot, limits that it does not have, and for shapes.
+    Raises ModelError for other models, limits that the robot does not have, and wrong shapes.
     """
     return examiner_of(robot, limits or Limits())(r, R)
 

@@ -18,14 +18,14 @@ ROUNDS = 8  # of a guess, which the number of places inside corrects; whole cell
 def grid_spacing(
     places: int, of: float | ArrayLike | Cells, *, dimensions: Literal[1, 2, 3, None] = None
 ) -> float:
-    """The side in m of equal cells of which a number fills a volume, an area or a length.
+    """Side in m of equal cells, of which a given number fills a volume, an area or a length.
 
         grid_spacing(1000, 2.0)                                   # 1000 cells in 2 m3
         grid_spacing(1000, [[0, 1], [-1, 1], [0.5, 0.5]])         # in a box, here a slice
-        grid_spacing(20_000, workspace(robot, limits, spacing=0.2))       # in what is inside of it
+        grid_spacing(20_000, workspace(robot, limits, spacing=0.2))       # in the cells inside
 
-    of: a size, in m3, or in m2 with dimensions=2 and m with dimensions=1; a box (3, 2) of (least, largest) x, y, z, where
-    equal ones make a slice; or a workspace. Raises ModelError for a number below one and for what has no size.
+    of: a size, in m3, or in m2 with dimensions=2 and m with dimensions=1; a box (3, 2) of (least, largest) x, y, z, with
+    equal ones for a slice; or a workspace. Raises ModelError for a number below one and for a size of zero.
     """
     check_words(grid_spacing, locals())
     count = whole("grid_spacing", "places", places, least=1, most=MOST)

@@ -26,19 +26,21 @@ _BLOCK = 1024  # poses, whose links and their distances stay in the cache
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Limits(Record):
-    """What a robot may do. Lengths in m, angles in rad; what is not said is not limited.
+    """Limits of the poses of a robot: strokes, joint angles, obstacles, link collisions. Lengths in m, angles in rad.
+
+    A quantity without a value here is not limited.
 
     strokes: (n, 2), least and largest actuator coordinates; (2,) for all carts alike; (3, 2) for the carts of a robot
-    with turntables; None takes what the model says, as `carts=[dict(s=Bounds(0, 2)), ...]`.
+    with turntables; None takes the bounds of the model, as `carts=[dict(s=Bounds(0, 2)), ...]`.
     ball_joint: largest angle of a link from the axis of its joints. cart_axes, plate_axes: these axes, (3,) or one per
     link, in the frame of the cart or turntable and of the plate; None is the direction of each link at the start of
     the model, or at `home`, the tool (3,) there.
     obstacles: Box, Cylinder, Capsule or any convex Obstacle, one or several. link_radius: of the links as capsules;
     plate: capsules in plate axes that stand for plate and tool. With a radius links of different arms may not touch
     each other either, where they end in different joints of the plate.
-    stroke_margin (m), turn_margin, angle_margin (rad), clearance (m): what must be left of each limit for safety.
-    Of a robot that does not say by rods() what its links are, strokes are (n, 2) in the order of its joints, ball joints
-    are limited through `passive`, and bars that it shows stand for its links. passive: (least, largest) of other variables
+    stroke_margin (m), turn_margin, angle_margin (rad), clearance (m): safety distance from each limit.
+    For a robot without `rods()` strokes are (n, 2) in the order of its joints, ball joints are limited through `passive`,
+    and the bars of its shapes stand for its links. passive: (least, largest) of other variables
     by name, such as {"elbows[0].phi": (0.2, 2.5)}. condition: largest ratio of the speeds of the tool in its quickest and
     its slowest direction for rates of the joints of one size; rotations count by `lever` m.
     """

@@ -26,7 +26,7 @@ _MOST = 20_000_000  # places, whose results fill a few GB
 
 
 class Workspace(Cells):
-    """Where the tool can be: the cells of a grid and what they hold, see `Cells`, with figures."""
+    """Workspace of a robot: grid cells inside, the broken limit of each cell outside, see `Cells`, and figures."""
 
     def plot(
         self,
@@ -39,7 +39,7 @@ class Workspace(Cells):
         """One layer across an axis (Figures 2.4, 4.16, 5.22 to 5.24), by default the largest across x.
 
         quantity: "limits" colours the first limit that is broken; "stroke", "turn", "angle" and "clearance" draw levels
-        of what is left of one. Obstacles and guideways are drawn where the layer cuts them. file: saves it there, too.
+        of the distance from a limit. Obstacles and guideways are drawn where the layer cuts them. file: saves it there, too.
         Raises ModelError for other axes and quantities.
         """
         check_words(Workspace.plot, locals())
@@ -71,12 +71,12 @@ def workspace(
 ) -> Workspace:
     """The workspace of a robot with one orientation of its plate.
 
-    robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; spacing: side of a cell at most, m, 0.05 if
-    nothing is said; places: in place of it, about how many are to be inside, some per cent more or less; box: (3, 2) of
-    (least, largest) x, y, z in m, equal ones for a slice, or None for what strokes and links allow; R: (3, 3), None for
-    the orientation that the links give, for a robot that turns its tool that of its start; refine: cells on the border are
-    judged by that many places along each axis. Raises ModelError for a box, a spacing or a robot that does not fit, and
-    where neither strokes nor a box bound the workspace.
+    robot: an instance such as GantryTau(prototypes.L1), or its Kinematics; spacing: greatest side of a cell, m, by
+    default 0.05; places: in place of spacing, number of cells inside, to some per cent; box: (3, 2) of
+    (least, largest) x, y, z in m, equal ones for a slice, or None for the box given by strokes and links;
+    R: (3, 3), or None for the orientation given by the links, of a robot that turns its tool for that of its start; refine:
+    number of points along each axis that judge a cell on the border. Raises ModelError for a box, a spacing or a robot that
+    does not fit, and where neither strokes nor a box bound the workspace.
     """
     refine = whole("workspace", "refine", refine, least=1)
     if spacing is not None:

@@ -1,4 +1,4 @@
-"""What a URDF file cannot say: how loops are closed, which joints are driven, where the joints start."""
+"""Additions to a URDF file: how loops are closed, which joints are driven, where the joints start."""
 
 import os
 from collections.abc import Mapping

@@ -192,7 +192,7 @@ class _Plan:
         return kind(n=axis, **{key: value for key, value in values.items() if value}, **seen)
 
     def _attach(self, joint: UrdfJoint, name: str) -> None:
-        """What acts on the axis of a joint: its drive, its friction, the joint that it follows."""
+        """Components at the axis of a joint: drive, friction, the joint that it follows."""
         slides = joint.kind == "prismatic"
         if joint.name in self.driven:
             drive = self._free(f"{name}_drive")

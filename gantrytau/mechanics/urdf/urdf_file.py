@@ -1,4 +1,4 @@
-"""What stands in a URDF file: links and joints of a tree, as numbers in m, kg, s and rad.
+"""Content of a URDF file: links and joints of a tree, as numbers in m, kg, s and rad.
 
 https://wiki.ros.org/urdf/XML: orientations are roll, pitch, yaw about fixed axes, R = Rz(yaw) Ry(pitch) Rx(roll); what
 belongs to a joint is resolved in the frame of its parent link, and its axis in its own frame, which is that of
@@ -23,7 +23,7 @@ NOWHERE = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a frame is in another: xyz (3,) in m, rpy (3,) in rad."""
+    """Pose of a frame in another: xyz (3,) in m, rpy (3,) in rad."""
 
     xyz: tuple[float, ...] = NOWHERE
     rpy: tuple[float, ...] = NOWHERE
@@ -40,7 +40,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Visual:
-    """What is seen of a link. kind: box, with size (3,) m; cylinder, along z, with size (radius, length); sphere, (radius,);
+    """Shape of a link. kind: box, with size (3,) m; cylinder, along z, with size (radius, length); sphere, (radius,);
     mesh, with its file and size (3,), m for a unit of the file.
     """
 
@@ -63,7 +63,7 @@ class UrdfLink:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """What joins a link to its parent. limits: of the coordinate, m or rad; effort, velocity: N or N.m, m/s or rad/s;
+    """Joint between a link and its parent. limits: of the coordinate, m or rad; effort, velocity: N or N.m, m/s or rad/s;
     damping, friction: viscous and Coulomb; mimic: of which joint it is (name, multiplier, offset).
     """
 
@@ -98,7 +98,7 @@ class UrdfTree:
     driven: tuple[str, ...]
 
     def refusal(self, found: str, expected: str) -> ModelError:
-        """What is wrong with the file, in words."""
+        """Error for a fault of the file."""
         return ModelError(f"{self.file}: found {found}, expected {expected}", argument="file")
 
 
@@ -113,7 +113,7 @@ def read_tree(file: str | os.PathLike[str]) -> UrdfTree:
             f"{path}: found no file that can be read ({error.strerror}), expected URDF", argument="file"
         ) from None
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise ModelError(f"{path}: found what is not XML ({error}), expected URDF", argument="file") from None
+        raise ModelError(f"{path}: found no XML ({error}), expected URDF", argument="file") from None
     if b"xacro:" in text:
         raise ModelError(
             f"{path}: found macros of xacro, expected URDF; write it with `xacro {path.name} > robot.urdf`",

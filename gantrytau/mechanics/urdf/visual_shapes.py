@@ -15,7 +15,7 @@ PACKAGE, FILE = "package://", "file://"
 
 @dataclass(frozen=True)
 class MeshFolders:
-    """Where the meshes of a URDF file are. packages: folders by the names of packages."""
+    """Search path for the meshes of a URDF file. packages: folders by the names of packages."""
 
     urdf: str
     packages: Mapping[str, str | os.PathLike[str]]
@@ -40,7 +40,7 @@ class MeshFolders:
 
 
 def shapes_of_link(link: UrdfLink, folders: MeshFolders) -> tuple[Shape, ...]:
-    """What is seen of a link; none where it says nothing, or no mesh of it is found."""
+    """Shapes of a link; none without <visual>, or where no mesh is found."""
     found = (_shape(visual, folders) for visual in link.visuals)
     return tuple(shape for shape in found if shape is not None)
 

@@ -17,7 +17,7 @@ HOP = 1000  # times rounding: a margin that stays nearer to zero turns by roundi
 
 
 class Chatter:
-    """How often each switch has turned, and when."""
+    """Counts and times of the turns of each switch."""
 
     def __init__(self):
         self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times

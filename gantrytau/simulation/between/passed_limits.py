@@ -28,7 +28,7 @@ def limited(flat: FlatModel) -> list[tuple[str, str, ca.SX, ca.SX]]:
 
 
 def stopping(dae: Translated) -> Translated:
-    """The same model whose run ends where a variable passes its limit."""
+    """The model with a run that ends where a variable passes its limit."""
     found = limited(dae.flat)
     if not found:
         return dae
@@ -45,7 +45,7 @@ def stopping(dae: Translated) -> Translated:
 
 
 def passed(dae: Translated, result: Result) -> str:
-    """What is to be said of limits that a result passes, "" if it keeps all; of its variables alone."""
+    """Warning of the limits passed by the variables of a result, "" if it keeps all."""
     told: list[tuple[float, str]] = []
     for name, side, _, limit in limited(dae.flat):
         if name not in result.names:

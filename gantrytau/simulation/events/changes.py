@@ -29,7 +29,7 @@ HOPS = 3  # of them, one after another
 
 
 class Changes:
-    """What changes at the places of a trail."""
+    """Changes at the points of a trail."""
 
     def __init__(self, coordinates: Coordinates, trail: Trail, sizes: np.ndarray, span: float):
         """sizes: of the states; span: of the run, s."""
@@ -72,7 +72,7 @@ class Changes:
         return self.coordinates.switches.look(*self.columns(places), self.sizes).blurred(self._rounded)
 
     def conditions(self, switches: np.ndarray) -> list[str]:
-        """What some switches ask for, in the model's words."""
+        """Conditions of some switches, in the model's names."""
         turns, pieces = self.coordinates.switches.turns, self.coordinates.pieces
         found = [pieces.asked(turns[int(i)].mode.name(), self.coordinates.dae) for i in switches]
         return list(dict.fromkeys(found))

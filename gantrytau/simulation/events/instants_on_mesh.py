@@ -52,7 +52,7 @@ def on_mesh(mesh: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _rounding(mesh: np.ndarray) -> float:
-    """What times of a mesh may differ by and be the same, s."""
+    """Tolerance below which two times of a mesh are the same, s."""
     return 8 * float(np.spacing(max(abs(mesh[0]), abs(mesh[-1]))))
 
 

@@ -33,7 +33,7 @@ class Margins:
 
     @property
     def below(self) -> np.ndarray:
-        """Which are below zero."""
+        """Whether each is below zero."""
         return self.values < -self.noise
 
     def until(self, count: int) -> "Margins":
@@ -102,7 +102,7 @@ class Switches:
         return rounding(arguments, ca.vertcat(margins, algebraic))
 
     def rounding(self, point: Point) -> np.ndarray:
-        """What rounding makes of the margins at a point, by all that leads to them, (switches,)."""
+        """Rounding errors of the margins at a point, from all their terms, (switches,)."""
         x, z, t, w = point
         own, inner = np.split(np.nan_to_num(np.array(self._rounding(x, z, t, t, w)).ravel()), [len(self)])
         if self._of_algebraics:

@@ -36,7 +36,7 @@ class InModes:
         return {mode.name(): value for mode, value in zip(modes, found, strict=True)}
 
     def asked(self, mode: str, dae: Translated) -> str:
-        """What a switch asks for, in the model's words."""
+        """Condition of a switch, in the model's names."""
         modes = {turn.mode.name(): turn for turn in self.switched.switches}
         leaves = {leaf.name() for leaf in ca.symvar(modes[mode].margin)}
         inner = [self.asked(name, dae) for name in sorted(leaves & modes.keys())]

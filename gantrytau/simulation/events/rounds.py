@@ -42,7 +42,7 @@ class Rounds:
     jump: AtPlaces
 
     def holding(self, point: Point) -> np.ndarray:
-        """Which conditions hold at a point."""
+        """Whether each condition holds at a point."""
         return self._at(self.conditions, point)[0] != 0
 
     def made(self, point: Point, rose: np.ndarray) -> Made:

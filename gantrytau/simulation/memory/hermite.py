@@ -24,7 +24,7 @@ def quintic(begin: np.ndarray, end: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 def shifted(coefficients: np.ndarray, s: np.ndarray | float) -> np.ndarray:
-    """The same polynomials (..., 6) in the time behind s, in the unit of theirs; s: (...)."""
+    """The polynomials (..., 6) in the time after s, in their unit of time; s: (...)."""
     powers = np.arange(ORDER + 1)[None, :] - np.arange(ORDER + 1)[:, None]
     factors = BINOMIALS * np.asarray(s)[..., None, None] ** np.maximum(powers, 0)
     return np.einsum("...jk,...k->...j", factors, coefficients)

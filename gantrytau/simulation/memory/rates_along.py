@@ -1,4 +1,4 @@
-"""How expressions change along a motion: their values, rates and second rates."""
+"""Expressions along a motion: their values, rates and second rates."""
 
 from collections.abc import Sequence
 

@@ -46,7 +46,7 @@ ARM = '<link name="base"/>' + link("arm")
         ('<link name="a"><visual><geometry><cone/></geometry></visual></link>', "'cone', expected a shape"),
         ("<link/>", "found a <link> without name="),
         ('<xacro:macro xmlns:xacro="x" name="m"/>', "found macros of xacro, expected URDF"),
-        ('<link name="a">', "found what is not XML"),
+        ('<link name="a">', "found no XML"),
         ('<link name="base"/><link name="f"/>' + joint("q", "floating", "base", "f"), "link 'f' without a"),
     ],
 )

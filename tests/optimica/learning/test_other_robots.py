@@ -6,12 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import gantrytau
-import gantrytau_models
-import gantrytau_optimica
 from gantrytau import Input, Model, ModelError, Parameter, Real, der
-from gantrytau.mechanics.translational import Force, Mass
-from gantrytau_fmu import cosimulate, export_fmu
 from gantrytau_models import CartServo, DeltaRobot, JointServo
 from gantrytau_optimica import Gradient, Learning, NormOptimal, Rig, Tukey, ZeroPhase, learn, square_reference
 from gantrytau_optimica.learning import Reference, Scatter, StraightAxes, read_corrections
@@ -182,9 +177,7 @@ def test_the_machine_of_the_page_learns_as_a_model_and_as_an_fmu(tmp_path, monke
     monkeypatch.chdir(tmp_path)
     page = (Path(__file__).parents[3] / "optimica" / "README.md").read_text(encoding="utf-8")
     part = page[page.index("**A machine of your own**") : page.index("**Paths.**")]
-    names = {"np": np, "Mass": Mass, "Force": Force, "export_fmu": export_fmu, "cosimulate": cosimulate}
-    for package in (gantrytau, gantrytau_models, gantrytau_optimica):
-        names |= {name: getattr(package, name) for name in package.__all__}
+    names = {}
     for block in re.findall(r"```python\n(.*?)```", part, re.DOTALL):
         exec(block, names)
     assert names["history"].relative[3, 0] < 0.2
