@@ -146,8 +146,8 @@ def array(
 
 
 def _numeric(values: np.ndarray, lost: bool) -> bool:
-    """Whether all of an array of objects are numbers, or None for what is lost; a symbol of CasADi makes a float too, nan."""
     """Whether an array of objects holds numbers alone, or None for lost ones; a symbol of CasADi makes a float too, nan."""
+    kinds = {type(value) for value in values.flat} - ({type(None)} if lost and values.ndim else set())
     return all(issubclass(kind, Number) and kind is not bool for kind in kinds)
 
 
