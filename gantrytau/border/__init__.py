@@ -1,5 +1,6 @@
 """What people hand in: refusals, checks, units, tables, files of settings and names, the same at every border."""
 
+from gantrytau.border.checks import number
 from gantrytau.border.named import (
     NamedObject,
     NotLoaded,
@@ -26,6 +27,7 @@ __all__ = [
     "load",
     "meant",
     "named",
+    "number",
     "prototype",
     "python_error",
     "read_table",

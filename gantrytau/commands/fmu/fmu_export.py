@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from gantrytau import flatten
-from gantrytau.border import listed, source_of
-from gantrytau.border.checks import number
+from gantrytau.border import listed, number, source_of
 from gantrytau.commands.arguments.model_choice import build
 from gantrytau.commands.arguments.option import serves
 from gantrytau.commands.arguments.options import Json, ModelName, PrototypeName, Settings
