@@ -70,7 +70,7 @@ class Policy:
         check_words(Policy, vars(self), "")
         limits: dict[str, dict[str, Any]] = {
             "tolerance": {"above": 0.0, "below": 1.0},
-            "max_time": {"above": 0.0, "most": math.inf},
+            "max_time": {"unit": "s", "above": 0.0, "most": math.inf},
         }
         limits |= {} if self.refine is None else {"refine": {"least": 1e-9, "below": 1.0}}
         for name, these in limits.items():
@@ -88,7 +88,8 @@ class Policy:
                 )
         if self.points == 1 and self._ramps:
             raise ModelError(
-                "at least 2, as it does not determine inputs that are ramps", found=Given("points", 1)
+                "expected at least 2: one point does not determine inputs that are ramps",
+                found=Given("points", 1),
             )
         self.mesh  # noqa: B018 - refuses what is no mesh
 
