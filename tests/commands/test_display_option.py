@@ -137,7 +137,7 @@ def test_files_of_parameters_and_studies_bring_their_units(answer, fails, shaft,
     assert (final["J"], final["r[1]"]) == (2.0, 0.002)
     values.write_text('J = "20000"\n')
     assert "found '20000' in quotes and without a unit" in " ".join(
-        fails(1, "simulate", shaft, "--stop", "1", "--set", str(values)).split()
+        fails(2, "simulate", shaft, "--stop", "1", "--set", str(values)).split()
     )
     study = tmp_path / "study.toml"
     study.write_text(
