@@ -58,7 +58,7 @@ def test_what_is_wrong_with_a_log_is_told_with_its_file(run, log, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words", "code"),
     [
-        (("--friction", "dry"), "--friction dry: found an unknown law", 2),
+        (("--friction", "dry"), "'dry' is not one of 'symmetric'", 2),
         (("--minimum-speed=-1",), "--minimum-speed -1.0: expected a number of at least 0", 2),
         (("--cutoff", "0"), "--cutoff 0.0: expected a number above 0", 2),
         (("--fixed", "link_masses"), "expected a number, as --fixed link_masses=0", 2),

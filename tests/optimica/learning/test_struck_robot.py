@@ -1,7 +1,5 @@
 """A robot under its servos is struck at its tool: as its linear equations say, and in the resonances that were printed."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -102,12 +100,7 @@ def test_a_rig_of_one_joint_without_a_tool():
 
 def test_wrong_pushes_are_told():
     rig = flexible_rig(friction=None)
-    for push, shape in (
-        (np.zeros((ROWS - 1, 3)), "(499, 3)"),
-        (np.zeros(3), "(3,)"),
-        (np.full((ROWS, 3), np.nan), "(500, 3)"),
-    ):
-        with pytest.raises(
-            ModelError, match=re.escape(f"Rig.run: found push of shape {shape}, expected finite forces in N")
-        ):
+    for push in (np.zeros((ROWS - 1, 3)), np.zeros(3), np.full((ROWS, 3), np.nan)):
+        with pytest.raises(ModelError, match=r"Rig\.run: found push") as refusal:
             rig.run(STILL, push=push)
+        assert refusal.value.argument == "push"

@@ -68,7 +68,5 @@ def test_turntables():
 def test_six_links_take_more_poses(poses):
     from gantrytau import ModelError
 
-    with pytest.raises(
-        ModelError, match=rf"poses: found {poses}, expected a whole number from 11 for .* six links"
-    ):
+    with pytest.raises(ModelError, match=rf"poses={poses}, expected a whole number of at least 11"):
         plan_calibration(*cells.six_links(), poses=poses, tape=0.001, robots=1)

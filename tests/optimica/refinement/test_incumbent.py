@@ -321,7 +321,7 @@ def test_time_ends_while_a_refinement_plays_back(monkeypatch):
 
 def test_time_ends_while_it_is_asked_whether_there_is_a_minimum(monkeypatch):
     monkeypatch.setattr(
-        sys.modules["gantrytau_optimica.prepared"], "places_aside", lambda *a, **k: time.sleep(60)
+        sys.modules["gantrytau_optimica.refinement.strategy"], "places_aside", lambda *a, **k: time.sleep(60)
     )
     with pytest.raises(SolveError, match="time limit reached; found until then: a solution on 20") as caught:
         optimize(CatalystMixing, elements=20, max_time=6.0)

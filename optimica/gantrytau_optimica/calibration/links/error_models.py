@@ -81,10 +81,9 @@ def check_model(model: object, robot: NominalRods, measurements: Measurements) -
         message = f"expected a robot with all six links, not {robot.name}; take SixLinkGantryTau, or "
         raise refused(message, Given("model", 1))
     if (six_links(model, robot) or robot.turntables) and measurements.R is None:
-        message = (
-            "for six links expected measurements with R, orientations of the plate; measure poses, or take "
-        )
-        raise refused(message, Given("model", 1))
+        message = "found measurements without R, expected orientations of a plate on six links; measure poses"
+        remedy = () if robot.turntables else (", or take ", Given("model", 1))
+        raise ModelError(message, *remedy, place="calibrate", argument="measurements")
     rails = 0 if measurements.rails is None else len(measurements.rails)
     if needs_rails(model) and rails != len(robot.arms):
         message = f"expected measured points of all {len(robot.arms)} guideways, not {rails}; give them by "
