@@ -69,7 +69,7 @@ class GantryTauError(Exception):
         return place + found + self.words(str)
 
     def words(self, write: Callable[[Given], str]) -> str:
-        """The message without its place and what was found, arguments in it as `write` gives them."""
+        """The parts of the message as text; `write` gives the text of an argument."""
         return "".join(write(part) if isinstance(part, Given) else str(part) for part in self.parts)
 
     def within(self, place: str) -> Self:
@@ -125,7 +125,7 @@ class DoubtfulResult(UserWarning):
 
 
 def short(value: Any) -> str:
-    """A value as Python writes it, in one line, cut where it is long; of an object without a text its class."""
+    """The `repr` of a value in one line, at most 60 characters; the class of an object without a `repr` of its own."""
     text = " ".join(repr(value.tolist() if hasattr(value, "tolist") else value).split())
     text = re.sub(r"<(?:[\w<>]+\.)*([\w<>]+) (?:object )?at 0x[0-9a-fA-F]+>", r"<\1>", text)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
@@ -147,7 +147,7 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
 
 
 def meant(wrong: str, words: Iterable[str]) -> str:
-    """The closest of a few words, which a message lists, as a question that ends it; "" if none is close."""
+    """The closest of a few words as a question for the end of a message; "" if none is close."""
     asked = did_you_mean(wrong, words)
     return asked if "did you mean" in asked else ""
 

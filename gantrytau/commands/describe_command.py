@@ -57,7 +57,7 @@ def _found(what: str) -> Any:
 
 
 def _others(what: str) -> list[str]:
-    """Components that a name without a module means as well, each with its module; none where it means one only."""
+    """All components of one name, each with its module; none if the name is unique."""
     found = [
         f"{path.rpartition('.')[2]}.{what}"
         for path, classes in component_classes().items()

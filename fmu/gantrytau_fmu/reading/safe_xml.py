@@ -17,7 +17,7 @@ _ENCODINGS = (
 
 
 def check_xml(text: bytes, place: str) -> None:
-    """Raise ModelError, which begins with `place`, for XML that is malformed or that could harm its reader.
+    """Raise ModelError at `place` for XML that is malformed, in another encoding, or nested too deeply.
 
     A document type is refused, as with it come entities: files of the machine, and billions of laughs.
     """

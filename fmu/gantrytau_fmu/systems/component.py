@@ -78,7 +78,7 @@ class Component:
 
     @property
     def title(self) -> str:
-        """What messages call it: its name in the system, or its file where it is alone and has none."""
+        """The name of the component in messages: that in the system, or its file if it runs alone."""
         return self.name or Path(self.file).name
 
     def expand(self, name: str, causality: str = "") -> tuple[str, ...]:

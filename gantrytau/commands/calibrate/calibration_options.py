@@ -1,4 +1,4 @@
-"""What options of `gantrytau calibrate measurements.csv` say of numbers: how well they are known, what they keep."""
+"""The options `--prior` and `--constraint` of `gantrytau calibrate measurements.csv`, read into values."""
 
 from collections.abc import Sequence
 from typing import Any

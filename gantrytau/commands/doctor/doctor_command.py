@@ -32,7 +32,7 @@ EXTRAS = ("results", "view", "cross", "vision", "cluster")
 
 @dataclass(frozen=True)
 class Checked:
-    """One line of the examination: what was tried, what was found, and what to do if it is not good.
+    """One line of the examination: the probe, its result, and a remedy if it failed.
 
     state: "ok", "broken" (it is there and does not work) or "not installed"; seconds: that the trial took.
     """
@@ -47,7 +47,7 @@ class Checked:
 
     @property
     def harmful(self) -> bool:
-        """Whether the installation is not as it should be: what is broken, and what is missing and essential."""
+        """Whether the probe found a fault: something broken, or something essential missing."""
         return self.state == BROKEN or (self.essential and self.state != OK)
 
 
@@ -92,7 +92,7 @@ def examine() -> Iterator[Checked]:
 
 
 def package(group: str, wanted: Requirement, extra: str = "") -> Checked:
-    """Whether a package is there, in a version that will do; extra: how its extra is installed, if it is of one."""
+    """Whether a package is installed in a sufficient version; extra: the command that installs its extra, if it has one."""
     try:
         found = importlib.metadata.version(wanted.name)
     except importlib.metadata.PackageNotFoundError:
