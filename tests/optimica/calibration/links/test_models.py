@@ -140,11 +140,12 @@ def test_kinematics_of_measured_guideways_go_back_and_forth(d1):
 
 def test_models_that_lack_something():
     q, r, R, rails = synthetic_d1.measure(0)
-    lacking = (None, Measurements(q, r), "measurements"), (4, Measurements(q, r, R, rails[:2]), "model")
-    for model, data, argument in lacking:
-        with pytest.raises(ModelError) as refusal:
-            calibrate(ROBOT, data, model=model)
-        assert refusal.value.argument == argument
+    with pytest.raises(ModelError, match="without R") as refusal:
+        calibrate(ROBOT, Measurements(q, r))
+    assert refusal.value.argument == "measurements"
+    with pytest.raises(ModelError, match="points of all 3 guideways") as refusal:
+        calibrate(ROBOT, Measurements(q, r, R, rails[:2]), model=4)
+    assert refusal.value.argument == "model"
     found = calibrate(ROBOT, Measurements(q, r, R), model=3)
     with pytest.raises(ModelError, match="direction for each link"):
         _ = found.robot
