@@ -14,6 +14,7 @@ from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau_models import F1GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
 from tests.benchmarks.engine import compiled
+from tests.benchmarks.peers.with_ida import IDA
 from tests.benchmarks.table import Row, at_least, at_most, in_turn, shown
 from tests.references import six_link as reference
 
@@ -85,8 +86,14 @@ def _second_of_the_robot() -> Iterator[Row]:
     coordinates = _six_links()
     x, z, _ = coordinates.start(0.0, np.zeros(0))
     run = coordinates.integrator(1, 1e-8)
-    times = in_turn({"run": lambda: run(x0=x, z0=z, p=[0.0, 1.0])}, 25)
+    peer = IDA(coordinates, 1e-8)
+    ends = run(x0=x, z0=z, p=[0.0, 1.0])["xf"].full().ravel(), peer.run()[: x.size]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-6
+    times = in_turn({"run": lambda: run(x0=x, z0=z, p=[0.0, 1.0]), "peer": peer.run}, 25)
     yield at_most("six links, 1 s with IDAS at 1e-8, integrator made before", 1e3 * times["run"], 3.0, "ms")
+    yield at_most(
+        "that against IDA of scikit-SUNDAE on the same functions", times["run"] / times["peer"], 1.0, "x"
+    )
 
 
 def _forward_dynamics() -> Iterator[Row]:
