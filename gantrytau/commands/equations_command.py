@@ -75,12 +75,12 @@ def equations(
                 origin = f" of prototype {chosen.prototype}" if chosen.prototype else ""
                 sides = f"{', '.join(wanted)} from {', '.join(known)}"
                 header = f"{chosen.name}{origin}: {sides}; parameters are numbers."
-                function = translate(chosen.model, events=True).function(list(known), list(wanted))
+                function = translate(flat, events=True).function(list(known), list(wanted))
                 text = c_source(
                     function, name=chosen.name, given=known, find=wanted, header=header, **derivatives
                 )
             else:
-                text = translate(chosen.model, given=known, find=wanted, events=True).equations(format)
+                text = translate(flat, given=known, find=wanted, events=True).equations(format)
         if output is not None:
             write_text(text, output)
         if json:

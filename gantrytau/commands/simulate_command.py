@@ -93,4 +93,4 @@ def _translated(
         for option, names in (("--plot", drawn), ("--outputs", kept), ("--input", signals)):
             check_names(option, (n for n in names if n not in flat.friction_modes), flat.expand)
         find = [name for name in (*drawn, *kept) if name.startswith("der(")]
-        return translate(chosen.model, find=find, events=True)
+        return translate(flat, find=find, events=True)

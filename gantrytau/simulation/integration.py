@@ -23,13 +23,15 @@ from gantrytau.simulation.signals import Signal
 from gantrytau.simulation.singular_poses import Approach, Look, Point, approach, doubtful
 from gantrytau.simulation.time_grid import LEAST_STEPS, Trail
 
-CHUNK = 10  # output intervals between two projections onto the constraints, or two looks for what switches
+CHUNK = 10  # output intervals between two looks for what switches
+STRETCH = 50  # between two projections onto the constraints
 FORESIGHT = 4.0  # intervals within which a margin that falls to zero may be why an integration fails
 REST = 10.0  # times the tolerance: what may be left of a margin
-PARTS = 4  # of a smooth run: in each the integrator starts anew, in steps of first order
+PARTS = 2  # of a smooth run: in each the integrator starts anew, in steps of first order
 GROWTH = 10  # of a stretch in which nothing has switched
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
 SOMETIMES = 0.1  # the same, where it starts anew at events
+SMOOTHLY = 0.02  # the same, else: the errors of all steps then add up to a few times the tolerance of a run
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 
@@ -58,8 +60,10 @@ class Run:
         self.narrow = NarrowForces(coordinates)
         interval = float(np.diff(self.trail.t).max())
         often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
-        own = OFTEN if often else SOMETIMES if len(coordinates.switches) or coordinates.rounds.whens else 1.0
+        smooth = not (often or len(coordinates.switches) or coordinates.rounds.whens)
+        own = OFTEN if often else SMOOTHLY if smooth else SOMETIMES
         exact = max(own * tolerance, min(LEAST, tolerance))
+        self.enough = tolerance if smooth else exact  # where rounding keeps the integrator from more
         self.integrators = Integrators(coordinates, exact, longest, interval)
         self.crosses, self.crossed = crosses, list[float]()  # times, s
         self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up before a pose
@@ -111,6 +115,9 @@ class Run:
                     turned = self._advance(count)
                 except RuntimeError as error:
                     if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
+                        continue
+                    if self.integrators.tolerance < self.enough:
+                        self.integrators.tolerance = self.enough
                         continue
                     if count == 1 and not self._nearer() and not self._across():
                         raise self._stopped(error) from error
@@ -165,8 +172,10 @@ class Run:
     def _longest(self) -> int:
         """The most intervals that are integrated at once."""
         coordinates, last = self.coordinates, self.trail.last
-        if coordinates.constrained or coordinates.sampled or coordinates.held or self.history:
+        if coordinates.sampled or coordinates.held or self.history:
             return min(CHUNK, last)
+        if coordinates.constrained:
+            return min(CHUNK if len(coordinates.switches) else STRETCH, last)
         if len(coordinates.switches):
             return CHUNK * GROWTH
         return max(CHUNK, last // PARTS)

@@ -65,9 +65,9 @@ def simulate(
     move first; a start that is fixed in the model is fixed at its new value.
     outputs: names of the variables to keep, by default all. points: number of output times. The result also has both
     sides of each event, at two equal times, and of each jump of sampled inputs if these are at most `points` (or 500).
-    tolerance: of the result, relative, and absolute in units of a state's `nominal`; an integrator step gets a tenth of it,
-    and errors of long motions add up. A state without nominal has the size 1, or that of a start below 1e-3. Where all
-    coupled states stay below a thousandth of their sizes, the run is repeated with the sizes seen.
+    tolerance: of the result, relative, and absolute in units of a state's `nominal`; a step of the integrator gets a 500th
+    of it or less, and errors of long motions add up. A state without nominal has the size 1, or that of a start below 1e-3.
+    Where all coupled states stay below a thousandth of their sizes, the run is repeated with the sizes seen.
     max_step: longest step, s. The default resolves functions of time, in inputs and model, that rest and then change during
     a 10,000th of the run. Shorter smooth changes may be stepped over, and so may forces along a state that are narrower
     than a hundredth of its largest value. Switches (`if_else`) are located however often they turn.

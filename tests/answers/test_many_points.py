@@ -201,6 +201,24 @@ def test_a_plate_that_turns_is_no_unknown_that_keeps_its_value():
     assert reduced(whole, whole(near)) is whole
 
 
+def test_an_angle_in_closed_form_is_the_one_that_is_followed():
+    """An arm of length 1 whose rod of length 2 holds a point: on its side it is known wherever the rod reaches."""
+    phi, r = ca.SX.sym("phi"), ca.SX.sym("r", 2)
+    rod = ca.sumsqr(r - ca.vertcat(ca.cos(phi), ca.sin(phi))) - 4
+    start, begin = np.array([np.arccos(0.25)]), np.array([2.0, 0.0])
+    arm = FollowedBranch(ca.Function("rod", [phi, r], [rod]), start, begin)
+    ends = np.random.default_rng(6).uniform(-4, 4, (2, 500))
+    far = np.linalg.norm(ends, axis=0)
+    found = arm.beside(ends, np.tile(begin[:, None], 500), np.tile(start[:, None], 500))[0]
+    np.testing.assert_array_equal(np.isnan(found), (far < 1) | (far > 3))
+    straight = arm(ends)[0]
+    led = np.isfinite(straight)  # the others lie behind the circle that the rod cannot enter
+    assert 0 < led.sum() < np.isfinite(found).sum()
+    np.testing.assert_allclose(np.cos(found - straight)[led], 1.0, atol=1e-12)
+    bent = FollowedBranch(ca.Function("bent", [phi, r], [rod + phi / 9]), start, begin)
+    assert bent.angle is None
+
+
 def test_elimination_beside_numpy():
     random = np.random.default_rng(4)
     for n in range(1, 7):

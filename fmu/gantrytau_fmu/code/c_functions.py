@@ -34,12 +34,12 @@ def c_function(
     roots: Sequence[int],
     *,
     hoisting: bool = False,
-    seldom: bool = False,
+    mark: str = "",
     flag: int | None = None,
 ) -> CFunction:
     """The function whose results r are the roots, from the arrays of the graph, then the hoisted one.
 
-    hoisting: the one that fills the hoisted array; seldom: small code is worth more than fast one; flag: a node whose
+    hoisting: the one that fills the hoisted array; mark: for the compiler, as `GT_SELDOM `; flag: a node whose
     value goes to w[GT_TRUSTED].
     """
     flags = [] if flag is None else [flag]
@@ -61,7 +61,6 @@ def c_function(
         pieces[home.get(root, 0)].result(f"r[{place}]", root)
     for root in flags:
         pieces[home.get(root, 0)].result("w[GT_TRUSTED]", root)
-    mark = "GT_SELDOM " if seldom else ""
     if len(pieces) == 1:
         return CFunction(name, mark + _whole(name, graph, pieces[0].lines), 0, len(order))
     code = [mark + _whole(f"{name}_{k}", graph, piece.lines) for k, piece in enumerate(pieces)]

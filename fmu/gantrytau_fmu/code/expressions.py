@@ -85,17 +85,16 @@ class ExpressionGraph:
 
     def _folded(self, name: str, a: int, b: int) -> int:
         """The sum or product of two nodes that rarely change; numbers are computed."""
-        first, second = (self.nodes[i][1] if self.nodes[i][0] == "CONST" else None for i in (a, b))
-        if first is not None and second is not None:
-            return self.node("CONST", first + second if name == "ADD" else first * second)
-        if name == "MUL" and 0.0 in (first, second):
+        first, second = self.nodes[a], self.nodes[b]
+        if first[0] != "CONST":
+            first, second, a, b = second, first, b, a
+        if first[0] != "CONST":
+            return self.node(name, *sorted((a, b)))
+        if second[0] == "CONST":
+            return self.node("CONST", first[1] + second[1] if name == "ADD" else first[1] * second[1])
+        if name == "MUL" and first[1] == 0.0:
             return self.node("CONST", 0.0)
-        neutral = 0.0 if name == "ADD" else 1.0
-        if first == neutral:
-            return b
-        if second == neutral:
-            return a
-        return self.node(name, *sorted((a, b)))
+        return b if first[1] == (0.0 if name == "ADD" else 1.0) else self.node(name, *sorted((a, b)))
 
     def _sum(self, terms: Iterable[tuple[int, int]]) -> int:
         """Sum of factor * node, the factors rarely changing: written in few nodes with factors computed once."""
@@ -112,11 +111,12 @@ class ExpressionGraph:
             if self.rarely[number]:
                 constant = self._folded("ADD", constant, self._folded("MUL", factor, number))
                 continue
-            inner, rest = forms.get(number, ({number: self.node("CONST", 1.0)}, self.node("CONST", 0.0)))
-            constant = self._folded("ADD", constant, self._folded("MUL", factor, rest))
+            inner, rest = forms.get(number, ({number: None}, None))
+            if rest is not None:
+                constant = self._folded("ADD", constant, self._folded("MUL", factor, rest))
             for base, weight in inner.items():
-                before = factors.get(base, self.node("CONST", 0.0))
-                factors[base] = self._folded("ADD", before, self._folded("MUL", factor, weight))
+                part = factor if weight is None else self._folded("MUL", factor, weight)
+                factors[base] = self._folded("ADD", factors[base], part) if base in factors else part
         return {b: f for b, f in factors.items() if self.nodes[f] != ("CONST", 0.0)}, constant
 
     def _written(self, factors: dict[int, int], constant: int) -> int:

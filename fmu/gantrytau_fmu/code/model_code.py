@@ -14,7 +14,7 @@ from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas
 from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph
 from gantrytau_fmu.code.operations import number_text
 
-SELDOM = {
+SELDOM = {  # small code is worth more than fast one
     "gt_outputs",
     "gt_starts",
     "gt_initial",
@@ -73,14 +73,19 @@ def model_code(
 
 
 def _function(graph: ExpressionGraph, name: str, roots: Sequence[int]) -> CFunction:
-    return c_function(graph, name, roots, seldom=name in SELDOM or name.startswith("gt_level_"))
+    return c_function(graph, name, roots, mark=_mark(name))
+
+
+def _mark(name: str) -> str:
+    return "GT_SELDOM " if name in SELDOM or name.startswith("gt_level_") else ""
 
 
 def _by_value(model: ModelGraph, name: str, roots: Sequence[int]) -> list[CFunction]:
     """A function that is computed with the pivots of the closed forms, and anew with others where these are small."""
     assert model.trusted is not None
-    quick = c_function(model.graph, f"{name}_quick", roots, seldom=name in SELDOM, flag=model.trusted)
-    careful = c_function(model.graph, f"{name}_careful", model.careful[name], seldom=True)
+    quick = c_function(model.graph, f"{name}_quick", roots, mark=_mark(name), flag=model.trusted)
+    mark = "GT_RARELY " if name in SELDOM else "GT_SELDOM "
+    careful = c_function(model.graph, f"{name}_careful", model.careful[name], mark=mark)
     lines = [
         f"static void {name}(const double *const *a, double *restrict r, double *restrict w) {{",
         f"  {name}_quick(a, r, w);",

@@ -61,11 +61,17 @@ class _Arrays:
 
     def around(self, q: np.ndarray) -> list[np.ndarray]:
         """Results at arguments to which the straight way from the start does not lead, by the ways that others took."""
-        return self.second.targets(q, self.grown(q))[0]
+        return self.second.targets(q, self._led(q))[0]
 
     def jacobian_around(self, q: np.ndarray) -> np.ndarray:
         """Their Jacobian."""
-        return self.second.jacobian(q, self.grown(q))
+        return self.second.jacobian(q, self._led(q))
+
+    def _led(self, q: np.ndarray) -> np.ndarray:
+        """Unknowns by ways around, where they are followed at all."""
+        if not self.second.direct:
+            return self.grown(q)
+        return self.second.tears_beside(q, np.repeat(self.second.start[:, None], q.shape[1], axis=1))
 
     @cached_property
     def grown(self) -> GrownBranch:
@@ -113,14 +119,14 @@ class ArrayFunction:
     def around(self, *arguments: np.ndarray) -> list[np.ndarray]:
         """Results, where the straight way from the start ends by ways around: as far as the branch goes."""
         q = self._checked(arguments)
-        found = self._everywhere(q, self._some)
-        return self._completed(q, found, lambda arrays, rows: [x.T for x in arrays.around(rows)])
+        return self._completed(q, self._some, lambda arrays, rows: [x.T for x in arrays.around(rows)])
 
     def jacobian_around(self, *arguments: np.ndarray) -> np.ndarray:
         """Jacobian of these, (N, m, k)."""
         q = self._checked(arguments)
-        found = self._everywhere(q, self._jacobian_of_some)
-        return self._completed(q, found, lambda arrays, rows: [arrays.jacobian_around(rows)])[0]
+        return self._completed(
+            q, self._jacobian_of_some, lambda arrays, rows: [arrays.jacobian_around(rows)]
+        )[0]
 
     def solutions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Results (m, n) of all branches at arguments (k,) and signs that tell them apart, (s, m)."""
@@ -136,10 +142,13 @@ class ArrayFunction:
     def _completed(
         self,
         q: np.ndarray,
-        found: list[np.ndarray],
+        straight: Callable[[np.ndarray], list[np.ndarray]],
         around: Callable[[_Arrays, np.ndarray], list[np.ndarray]],
     ) -> list[np.ndarray]:
-        """With rows that are NaN found by ways around, where unknowns are followed along branches at all."""
+        """Results by straight ways, and by ways around where these end; the latter at once where nothing is followed."""
+        if len(q) >= FEW and self._grows and self._arrays.second.direct:
+            return self._everywhere(q, lambda rows: around(self._arrays, rows.T))
+        found = self._everywhere(q, straight)
         lost = np.isfinite(q).all(axis=1) & ~_finite(found)
         if lost.any() and self._grows:
             for whole, part in zip(found, around(self._arrays, q[lost].T), strict=True):

@@ -16,6 +16,7 @@ from gantrytau.answers import branch_follower as one
 from gantrytau.answers.implicit_blocks import SOLVED
 from gantrytau.answers.many_points.array_program import ArrayProgram, NotForArrays
 from gantrytau.answers.many_points.elimination import eliminated, order_of_pivots, solved
+from gantrytau.answers.many_points.one_angle import OneAngle, one_angle
 from gantrytau.language.term_sizes import term_sizes
 
 MOST = one.TRIALS[0] * one.TRIALS[1]
@@ -41,7 +42,19 @@ class FollowedBranch:
 
     def beside(self, end: np.ndarray, begin: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Y (n, N) at `end` (k, N), each led from another point of the branch, start (n, N) at begin (k, N)."""
+        if self.angle:
+            return self._corrected(self.angle.near(end, start) / self.units[1][:, None], end)
         return self._anywhere(np.vstack([end, begin]), start)
+
+    @cached_property
+    def angle(self) -> OneAngle | None:
+        """The equation in closed form, if it is one for an angle."""
+        return None if self.anywhere else one_angle(self.residual, self.start, self.begin)
+
+    @property
+    def direct(self) -> bool:
+        """Whether `beside` knows the branch without following it."""
+        return self.angle is not None
 
     @cached_property
     def _anywhere(self) -> "FollowedBranch":
@@ -54,6 +67,8 @@ class FollowedBranch:
         start = np.repeat(self.start[:, None], end.shape[1], axis=1) if start is None else start
         z = start / self.units[1][:, None]
         way = np.ones((2, end.shape[1]))
+        if self.angle:
+            way[1, np.isnan(self.angle.near(end, start)[0])] = 0.0
         self._along(self._trial, way, z, end)
         late = np.flatnonzero(way[0] > 0)
         if late.size and len(rows) > 1:

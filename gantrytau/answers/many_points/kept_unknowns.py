@@ -36,6 +36,11 @@ class ReducedBranch:
     places: Sequence[Sequence[int]]
     kept: np.ndarray
 
+    @property
+    def direct(self) -> bool:
+        """See `FollowedBranch.direct`."""
+        return all(part.direct for part in self.parts)
+
     def __call__(self, end: np.ndarray) -> np.ndarray:
         """Y (n, N) at `end` (k, N); NaN where the branch does not lead there."""
         y, holds, pivots = self._completed([part(end) for part in self.parts], end)

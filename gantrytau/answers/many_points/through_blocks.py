@@ -23,6 +23,8 @@ LOOKED_AT = 16  # points at each of these distances
 class LinearSolution:
     """A block of linear equations that are solved point by point: NaN where they are singular."""
 
+    direct = True
+
     def __init__(self, parts: tuple[ca.Function, ca.Function, ca.DM, np.ndarray]):
         matrix, rows, self._other, self._columns = parts
         self._matrix, self._rows = ArrayProgram(matrix), ArrayProgram(rows)
@@ -88,6 +90,11 @@ class ThroughBlocks:
         holds = [reduce(ca.logic_and, trusted)] if trusted else [ca.SX(1)]
         self._rest = ArrayProgram(ca.Function("rest", everything, [*whole, *holds], {"cse": True}))
         self._jacobian = lambda: _jacobian_of(everything, residuals, ca.vertcat(*whole))
+
+    @property
+    def direct(self) -> bool:
+        """Whether all that would be led from one point to another is known without."""
+        return all(step.direct for _, step in self._steps)
 
     def tears(self, q: np.ndarray) -> np.ndarray:
         """Unknowns without closed form (n, N) of arguments (k, N)."""

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import gantrytau_models
 from gantrytau import Connector, Model, ModelError, check_member, parameters_of, read_parameters, with_setting
 from gantrytau.border import NamedObject, import_by_name, load, prototype, similar, source_of
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError, note, refusing
+from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
 
@@ -140,8 +142,6 @@ def _keywords(found: type[Model], choice: NamedObject) -> dict[str, Any]:
 
 def library() -> dict[str, type[Model]]:
     """The models of the library by name."""
-    import gantrytau_models
-
     found = {name: getattr(gantrytau_models, name) for name in gantrytau_models.__all__}
     return {name: value for name, value in found.items() if value in MODEL}
 
@@ -162,8 +162,6 @@ def _is_part(found: type[Model]) -> bool:
 
 def prototype_names() -> tuple[str, ...]:
     """The names of the records of robots."""
-    from gantrytau_models import prototypes
-
     return tuple(prototypes.names())
 
 
@@ -174,9 +172,10 @@ def first_sentence(text: str | None) -> str:
 
 def _by_name(choice: NamedObject, kind: Kind) -> Any:
     """The class of a name: a model of the library, or a class by its full name, `package.module:Class`."""
-    name, models = choice.name, library()
-    if name in models:
-        return _checked(models[name], name, kind)
+    name = choice.name
+    found = getattr(gantrytau_models, name) if name in gantrytau_models.__all__ else None
+    if found in MODEL:
+        return _checked(found, name, kind)
     path = Path(name.rpartition(":")[0] or name)
     if path.is_file() or len(path.parts) > 1:
         raise CommandError(f"{name} is no Python file, expected one, as {kind.example}")
@@ -187,7 +186,7 @@ def _by_name(choice: NamedObject, kind: Kind) -> Any:
     if kind is not MODEL:
         raise CommandError(f"{name}: there is no {kind.word} of this name; name its file, as {kind.example}")
     raise CommandError(
-        f"{name}: the library has no model of this name{similar(name, models)}\n"
+        f"{name}: the library has no model of this name{similar(name, library())}\n"
         f"`gantrytau library` lists the models; one of your own is named by its file, as {kind.example}"
     )
 
@@ -281,8 +280,6 @@ def fitting_prototypes(found: type[Model]) -> tuple[str, ...]:
 
 def _record(name: str) -> Any:
     """A prototype by name, without its warnings."""
-    from gantrytau_models import prototypes
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return getattr(prototypes, name)
@@ -295,8 +292,6 @@ def sources() -> dict[str, str]:
 
 def _prototype(found: type[Model], name: str) -> Any:
     """The prototype of that name for a class, with what it warns of."""
-    from gantrytau_models import prototypes
-
     with warnings.catch_warnings(record=True) as caught, refusing(f"--prototype {name}: "):
         warnings.simplefilter("always")
         record = prototype(name, prototypes)
