@@ -14,6 +14,7 @@ from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
 from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
+from gantrytau_optimica.control.constant_algebraics import without_constants
 from gantrytau_optimica.control.control_problem import (
     ControlProblem,
     Course,
@@ -92,7 +93,8 @@ def build(
     check_reached(draft, zip(limits, rows[::3], strict=True))
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
-    built = at_pace(Built(read, draft, system, numbers, points, constraints, closed, causality), guess)
+    built = Built(read, draft, system, numbers, points, constraints, closed, causality)
+    built = at_pace(without_constants(built, guess), guess)
     return replace(built, problem=with_margins(with_sizes(with_guesses(built, guess))))
 
 
