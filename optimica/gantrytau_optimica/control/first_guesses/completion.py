@@ -75,7 +75,7 @@ class Completion:
             pattern[i].append(j)
         found = decompose(pattern, unknowns.numel())
         self.determined = not (found.surplus or found.undetermined)
-        self.blocks: list[Block] = []
+        self.blocks: list[NewtonBlock] = []
         for own, places in found.blocks:
             outright = closed.get(places[0]) if len(places) == 1 else None
             r, x = residuals[list(own)], unknowns[list(places)]
@@ -83,7 +83,7 @@ class Completion:
             function = ca.Function(
                 "block", [knowns, unknowns], [ca.densify(e) for e in results], {"cse": True}
             )
-            self.blocks.append(Block(function, np.array(places), outright is not None))
+            self.blocks.append(NewtonBlock(function, np.array(places), outright is not None))
 
     def along(self, begin: np.ndarray, knowns: np.ndarray) -> np.ndarray:
         """Unknowns (k, n) at values of what is known (n, m), from those at the start with what is known there, (m,).
@@ -103,7 +103,7 @@ class Completion:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class NewtonBlock:
     """(known, unknowns) -> residuals and their Jacobian by the unknowns at `places`, or outright their only value."""
 
     function: ca.Function
@@ -114,7 +114,7 @@ class Block:
 class Newton:
     """Newton's method, block after block, on arrays that CasADi reads and writes in place."""
 
-    def __init__(self, blocks: Sequence[Block], known: int, unknowns: int):
+    def __init__(self, blocks: Sequence[NewtonBlock], known: int, unknowns: int):
         self.known, self.y = np.zeros(known), np.zeros(unknowns)
         self.calls = []
         for block in blocks:
