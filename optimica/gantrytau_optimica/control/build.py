@@ -13,7 +13,9 @@ from gantrytau.compiler.system import Causality, System
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
 from gantrytau_optimica.control.built import Built, with_values
+from gantrytau_optimica.control.cancellation import without_cancelled
 from gantrytau_optimica.control.conditions import link_conditions, start_conditions, with_targets
+from gantrytau_optimica.control.constant_algebraics import without_constants
 from gantrytau_optimica.control.control_problem import (
     ControlProblem,
     Course,
@@ -64,8 +66,7 @@ def build(
     values = resolve([p.expression for p in points])
     times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
     objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
-    ode, residuals = with_values([system.ode, system.residuals], read, numbers)
-    split = _Split(read, system, ode, residuals, dict(controls or {}), rates)
+    split = _split(read, system, numbers, dict(controls or {}), rates)
     phases = []
     for k, stage in enumerate(read.phases):
         integrand, start_time, final_time = resolve([stage.integrand, stage.start_time, stage.final_time])
@@ -92,8 +93,24 @@ def build(
     check_reached(draft, zip(limits, rows[::3], strict=True))
     outright = {a.name: a.closed for a in system.algebraics if a.closed is not None}
     closed = dict(zip(outright, with_values([*outright.values()], read, {}), strict=True))
-    built = at_pace(Built(read, draft, system, numbers, points, constraints, closed, causality), guess)
+    built = Built(read, draft, system, numbers, points, constraints, closed, causality)
+    built = at_pace(without_constants(built, guess), guess)
     return replace(built, problem=with_margins(with_sizes(with_guesses(built, guess))))
+
+
+def _split(
+    read: SymbolicProblem,
+    system: System,
+    numbers: Mapping[str, float],
+    controls: dict[str, Pieces],
+    rates: Rates,
+) -> "_Split":
+    """The equations with these numbers."""
+    equations = with_values([system.ode, system.residuals], read, numbers)
+    if any(a.min >= 0.0 for a in system.algebraics):  # positions that follow from roots w leave x - (x - w)
+        equations = without_cancelled(equations)
+    ode, residuals = equations
+    return _Split(read, system, ode, residuals, controls, rates)
 
 
 def _statements(read: SymbolicProblem) -> list[ca.SX]:

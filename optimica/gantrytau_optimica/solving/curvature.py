@@ -91,6 +91,13 @@ def least_curvature(program: Program, solution: Solution) -> Curvature:
     return Curvature(least, whole, max(not_curved - falling, 0))
 
 
+def falls_somewhere(program: Program, solution: Solution) -> bool:
+    """Whether a curvature is negative, by one factorisation; False where rounding leaves nothing of it."""
+    size = objective_size(program)
+    conditions = _conditions(program, solution, size) if size > 0 else None
+    return conditions is not None and conditions.free.size > 0 and bool(conditions.below(-FLAT))
+
+
 @dataclass(frozen=True, eq=False)
 class _Conditions:
     """The matrices at the head of this file, of the unknowns `free` that are not at a limit; hard: rows that hold."""

@@ -61,14 +61,21 @@ class Watch(ca.Callback):
         size = self.sizes.get(ca.nlpsol_out(i), 0)
         return ca.Sparsity.dense(size, 1) if size else ca.Sparsity(0, 1 if i else 0)
 
-    def eval(self, arg: Any) -> list[int]:
+    def has_eval_buffer(self) -> bool:
+        return True
+
+    def eval_buffer(self, arg: Any, res: Any) -> int:
         self.iteration += 1
-        self.last = {ca.nlpsol_out(i): np.array(one).ravel() for i, one in enumerate(arg)}
+        self.last = {
+            ca.nlpsol_out(i): np.zeros(0) if one is None else np.frombuffer(one).copy()
+            for i, one in enumerate(arg)
+        }
         if self.clock is not None and self.clock.progress is not None and not self.left:
-            self.told.put((self.iteration, float(arg[1])))
+            self.told.put((self.iteration, self.last["f"].item()))
             self.heard.get()
         late = self.clock is not None and not self.clock.left
-        return [1 if self.pressed or late or self.left or self.error is not None else 0]
+        np.frombuffer(res[0])[:] = float(self.pressed or late or self.left or self.error is not None)
+        return 0
 
     def tell(self, iteration: int, objective: float) -> None:
         """Report an iteration, on the thread of the caller: what is shown is seldom made to be called from others."""

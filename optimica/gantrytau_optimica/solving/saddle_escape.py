@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gantrytau_optimica.solving.curvature import least_curvature
+from gantrytau_optimica.solving.curvature import falls_somewhere, least_curvature
 from gantrytau_optimica.solving.ipopt import Solution
 from gantrytau_optimica.transcription.assemble import scipy_matrix
 from gantrytau_optimica.transcription.program import Program
@@ -24,7 +24,7 @@ BENT = 1e-6  # curvatures less than this do
 
 def places_aside(program: Program, solution: Solution) -> Iterator[np.ndarray]:
     """Unknowns to go on from beside a solution that is a maximum or a saddle; none where it is a minimum."""
-    if solution.upright:
+    if solution.upright or not falls_somewhere(program, solution):
         return
     found = least_curvature(program, solution)
     if not found.falls or found.direction is None:

@@ -12,7 +12,7 @@ from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Limit
 from gantrytau_optimica.solving.ipopt import Solution, Solver, SolverSettings, objective_size
 from gantrytau_optimica.studies.kkt import stationarity
-from gantrytau_optimica.transcription.program import Program
+from gantrytau_optimica.transcription.program import Program, first_guess
 from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 SAME = 1e-6  # relative: within it two objectives are those of one solution
@@ -29,9 +29,11 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     located = np.array([n.guess for n in built.problem.free])
     borders = [layout.placed(optimum.solution.w).borders for layout in program.places.layouts]
     new = transcribed_again(program, built.problem, located=(located, borders))
-    w = np.concatenate([located, optimum.solution.w[len(values) :]])
+    w = _unknowns(program, new, optimum.solution.w)
     solution = _carried(program, new, optimum.solution, w)
-    if solution is None:  # limits in which the parameters occur are rows of their own now
+    if (
+        solution is None
+    ):  # limits in which the parameters occur are rows of their own now, or constants are none
         solution = Solver(new, SolverSettings()).solve(new, w)
     found = replace(optimum, built=built, program=new, solution=solution)
     size = max(abs(optimum.objective), objective_size(new))
@@ -48,7 +50,7 @@ def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
     """The control problem with values of its numbers, and guesses and typical sizes, as another one has them."""
     known = {s.name: s for s in old.problem.signals}
     sized = built.problem.with_signals(
-        lambda _, s: replace(s, nominal=known[s.name].nominal, guess=known[s.name].guess)
+        lambda _, s: replace(s, nominal=known.get(s.name, s).nominal, guess=known.get(s.name, s).guess)
     )
     sizes = {n.name: n.size for n in old.problem.free}
     numbers = []
@@ -60,7 +62,9 @@ def _same_sizes(built: Built, old: Built, values: Mapping[str, float]) -> Built:
     phases = tuple(
         replace(
             phase,
-            residual_sizes=before.residual_sizes,
+            residual_sizes=before.residual_sizes
+            if before.residual_names == phase.residual_names
+            else phase.residual_sizes,
             path_limits=_sized(phase.path_limits, before.path_limits),
         )
         for phase, before in zip(sized.phases, old.problem.phases, strict=True)
@@ -74,6 +78,19 @@ def _sized(limits: Sequence[Limit], old: Sequence[Limit]) -> tuple[Limit, ...]:
     if [limit.name for limit in limits] != [limit.name for limit in old]:
         return tuple(limits)
     return tuple(replace(limit, size=before.size) for limit, before in zip(limits, old, strict=True))
+
+
+def _unknowns(old: Program, new: Program, w: np.ndarray) -> np.ndarray:
+    """The unknowns (unscaled) of a program on the same meshes, as they are in another one; what is new as it is guessed."""
+    found = first_guess(new)
+    for before, layout in zip(old.places.layouts, new.places.layouts, strict=True):
+        found[layout.knots] = w[before.knots]
+        known = {s.name: before.of(k) for k, s in enumerate(before.phase.signals)}
+        for k, signal in enumerate(layout.phase.signals):
+            mine = layout.of(k)
+            if mine.size == known.get(signal.name, mine[:0]).size:
+                found[mine] = w[known[signal.name]]
+    return found
 
 
 def _carried(old: Program, new: Program, solution: Solution, w: np.ndarray) -> Solution | None:

@@ -15,6 +15,7 @@ from tests.benchmarks.peers.written import Columns, Motion
 
 TROLLEY, LOAD, G = 200.0, 120.0, 9.81  # kg, kg, m/s2
 FORCE, HOIST, RATE = 600.0, 2000.0, 800.0  # N, N, N/s
+NEWTON = 1000.0  # forces by hand are written in kN
 START, END = (0.0, 4.0), (6.0, 2.5)  # m, place of the trolley and length of the rope
 
 
@@ -66,12 +67,15 @@ class CraneMotion(Optimization):
 
 
 def motion() -> Motion:
-    """By hand: the forces are states, their rates are chosen."""
+    """By hand: the forces are states, their rates are chosen; both in the unit of NEWTON."""
     x, u = ca.SX.sym("x", 8), ca.SX.sym("u", 2)
-    _, v, length, rate, phi, w, f, h = ca.vertsplit(x)
+    _, v, length, rate, phi, w, *forces = ca.vertsplit(x)
+    f, h = (NEWTON * force for force in forces)
     a = (f + h * ca.sin(phi)) / TROLLEY
     along = length * w**2 + G * ca.cos(phi) - a * ca.sin(phi) - h / LOAD
     across = -(a * ca.cos(phi) + G * ca.sin(phi) + 2 * rate * w) / length
+
+    hanging = LOAD * G / NEWTON
 
     def guess(shares: np.ndarray) -> Columns:
         position, speed, _ = trapezoid(shares)
@@ -79,15 +83,15 @@ def motion() -> Motion:
         for row, first, last in zip((0, 2), START, END, strict=True):
             states[row] = first + (last - first) * position
             states[row + 1] = (last - first) * speed / 8.0
-        states[7] = LOAD * G
+        states[7] = hanging
         return states, np.zeros((0, shares.size)), np.zeros((2, shares.size))
 
-    upper = np.array([*(np.inf,) * 6, FORCE, HOIST, RATE, RATE])
-    lower = np.array([*(-np.inf,) * 6, -FORCE, 0.0, -RATE, -RATE])
+    upper = np.array([*(np.inf,) * 6, *(np.array([FORCE, HOIST, RATE, RATE]) / NEWTON)])
+    lower = np.array([*(-np.inf,) * 6, *(np.array([-FORCE, 0.0, -RATE, -RATE]) / NEWTON)])
     return Motion(
         x=x, z=ca.SX(0, 1), u=u,
         ode=ca.vertcat(v, a, rate, along, w, across, u), residual=ca.SX(0, 1), path=ca.SX(0, 1), path_limits=(0.0, 0.0),
-        limits=(lower, upper), start=np.array([START[0], 0, START[1], 0, 0, 0, 0, LOAD * G]),
-        end=np.array([END[0], 0, END[1], 0, 0, 0, 0, LOAD * G]),
+        limits=(lower, upper), start=np.array([START[0], 0, START[1], 0, 0, 0, 0, hanging]),
+        end=np.array([END[0], 0, END[1], 0, 0, 0, 0, hanging]),
         guess=guess, guessed_time=8.0, times=(1.0, 30.0), ramps=True,
     )  # fmt: skip

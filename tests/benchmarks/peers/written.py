@@ -15,6 +15,7 @@ IPOPT = {
     "sb": "yes",
     "mu_strategy": "adaptive",
     "linear_solver": "mumps",
+    "mumps_pivot_order": 6,  # with MUMPS' own the six links are not solved on 50 elements
     "max_wall_time": 120.0,
 }
 

@@ -8,7 +8,8 @@ for Nonlinear Problems, 2004, section 2.1): a longer one might end on another br
 are the slopes of the guessed speeds, and the inputs are what moves the mechanism so.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -74,7 +75,7 @@ class Completion:
             pattern[i].append(j)
         found = decompose(pattern, unknowns.numel())
         self.determined = not (found.surplus or found.undetermined)
-        self.blocks: list[tuple[ca.Function, np.ndarray, bool]] = []
+        self.blocks: list[NewtonBlock] = []
         for own, places in found.blocks:
             outright = closed.get(places[0]) if len(places) == 1 else None
             r, x = residuals[list(own)], unknowns[list(places)]
@@ -82,58 +83,89 @@ class Completion:
             function = ca.Function(
                 "block", [knowns, unknowns], [ca.densify(e) for e in results], {"cse": True}
             )
-            self.blocks.append((function, np.array(places), outright is not None))
+            self.blocks.append(NewtonBlock(function, np.array(places), outright is not None))
 
     def along(self, begin: np.ndarray, knowns: np.ndarray) -> np.ndarray:
         """Unknowns (k, n) at values of what is known (n, m), from those at the start with what is known there, (m,).
 
         NaN from where no solution is found.
         """
+        newton = Newton(self.blocks, begin.size, self.start.size)
         found = np.full((len(knowns), self.start.size), np.nan)
         here, y = begin, self.start
         for k, there in enumerate(knowns):
-            reached = self._moved(here, there, y, MOST_HALVINGS)
+            reached = newton.moved(here, there, y, MOST_HALVINGS)
             if reached is None:
                 break
             here, y = there, reached
             found[k] = y
         return found
 
-    def _moved(self, here: np.ndarray, there: np.ndarray, y: np.ndarray, halvings: int) -> np.ndarray | None:
+
+@dataclass(frozen=True, eq=False)
+class NewtonBlock:
+    """(known, unknowns) -> residuals and their Jacobian by the unknowns at `places`, or outright their only value."""
+
+    function: ca.Function
+    places: np.ndarray
+    outright: bool
+
+
+class Newton:
+    """Newton's method, block after block, on arrays that CasADi reads and writes in place."""
+
+    def __init__(self, blocks: Sequence[NewtonBlock], known: int, unknowns: int):
+        self.known, self.y = np.zeros(known), np.zeros(unknowns)
+        self.calls = []
+        for block in blocks:
+            shapes = [block.function.size_out(i) for i in range(block.function.n_out())]
+            results = [np.zeros(rows * columns) for rows, columns in shapes]
+            buffer, evaluate = block.function.buffer()
+            for i, argument in enumerate((self.known, self.y)):
+                buffer.set_arg(i, argument.data)
+            for i, result in enumerate(results):
+                buffer.set_res(i, result.data)
+            results = [x.reshape(shape, order="F") for x, shape in zip(results, shapes, strict=True)]
+            self.calls.append((block, buffer, evaluate, results))
+
+    def moved(self, here: np.ndarray, there: np.ndarray, y: np.ndarray, halvings: int) -> np.ndarray | None:
         """The unknowns there, from those here, in as many steps as it takes; None where they are not found."""
         found = self._solved(there, y)
         if found is not None or not halvings:
             return found
         middle = 0.5 * (here + there)
-        half = self._moved(here, middle, y, halvings - 1)
-        return None if half is None else self._moved(middle, there, half, halvings - 1)
+        half = self.moved(here, middle, y, halvings - 1)
+        return None if half is None else self.moved(middle, there, half, halvings - 1)
 
     def _solved(self, known: np.ndarray, y: np.ndarray) -> np.ndarray | None:
-        y = y.copy()
-        for function, places, outright in self.blocks:
-            if outright:
-                y[places] = float(function(known, y))
-            elif not self._corrected(function, places, known, y):
+        self.known[:], self.y[:] = known, y
+        for block, _, evaluate, results in self.calls:
+            if block.outright:
+                evaluate()
+                self.y[block.places] = results[0].item()
+            elif not self._corrected(block.places, evaluate, *results):
                 return None
-        return y if np.all(np.isfinite(y)) else None
+        return self.y.copy() if np.all(np.isfinite(self.y)) else None
 
-    @staticmethod
-    def _corrected(function: ca.Function, places: np.ndarray, known: np.ndarray, y: np.ndarray) -> bool:
+    def _corrected(
+        self, places: np.ndarray, evaluate: Callable[[], None], r: np.ndarray, jacobian: np.ndarray
+    ) -> bool:
         """Whether Newton's method solves one block, in place."""
         before = np.inf
         for _ in range(MOST_CORRECTIONS):
-            r, jacobian = (np.array(part) for part in function(known, y))
-            if not (np.all(np.isfinite(r)) and np.all(np.isfinite(jacobian))):
+            evaluate()
+            if not (np.isfinite(r).all() and np.isfinite(jacobian).all()):
                 return False
             try:
                 step = np.linalg.solve(jacobian, r)[:, 0]
             except np.linalg.LinAlgError:
                 return False
-            y[places] -= step
-            size = float(np.linalg.norm(step))
-            if size <= SMALL * float(np.linalg.norm(y[places])) or size == 0.0:
+            self.y[places] -= step
+            size = math.sqrt(step @ step)
+            length = math.sqrt(self.y[places] @ self.y[places])
+            if size <= SMALL * length or size == 0.0:
                 return True
             if size > SHRINKING * before:
-                return size <= ROUNDING * float(np.linalg.norm(y[places]))
+                return size <= ROUNDING * length
             before = size
         return False
