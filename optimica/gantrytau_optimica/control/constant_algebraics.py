@@ -58,10 +58,11 @@ def without_constants(built: Built, guess: Mapping[str, Any]) -> Built:
 
 
 def _constants(problem: ControlProblem, phase: Phase, guesses: Mapping[str, Guess]) -> Constants:
-    """Algebraics that neither the guess nor, to first order, anything they depend on moves."""
+    """Algebraics within their limits that neither the guess nor, to first order, anything they depend on moves."""
     z = np.array([guesses[a.name](SHARES) for a in phase.algebraics]).reshape(-1, SHARES.size)
     values = np.round(z[:, 0] / SAME) * SAME
     still = np.max(np.abs(z - values[:, None]), axis=1, initial=0.0) <= SAME * np.maximum(np.abs(values), 1.0)
+    still &= [a.min <= value <= a.max for a, value in zip(phase.algebraics, values, strict=True)]
     if not np.any(still):
         return {}
     time, unknowns, others = arguments = _arguments(problem, phase)
