@@ -68,16 +68,15 @@ class EquationReader(DeclarationReader):
 
     def end_of(self, word: str) -> None:
         """`end if`, with the word of the block."""
-        if self.kind != "end" or self.next_kind not in BLOCKS:
-            if self.kind == "end" and self.next_kind != "name":
-                self.advance()
+        if self.kind != "end" or self.next_kind not in (";", *BLOCKS):
             self.refuse(f"'end {word}'")
+        at = self.at
         self.advance()
-        if self.kind != word:
-            found = self.advance()
-            self.note(self.starts[self.i - 2], f"found 'end {found}', expected 'end {word}'")
-            return
-        self.advance()
+        found = self.kind
+        if found != word:
+            self.note(at, f"found 'end {found}', expected 'end {word}'".replace(" ;", ""))
+        if found in BLOCKS:
+            self.advance()
 
     def equation(self, section: str) -> tree.SimpleEquation | tree.ProcedureCall:
         """`a = b`, or a call; in constraints also `a <= b`."""

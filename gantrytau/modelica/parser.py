@@ -8,6 +8,7 @@ from gantrytau.modelica.equations import ENDS, EquationReader
 from gantrytau.modelica.source import SourceText
 from gantrytau.modelica.tokens import BLOCKS, Faulty
 
+IN_REFERENCES = ("name", "number", "[", "]", ".", ":", ",")
 ELEMENT_SECTIONS = ("", "public", "protected")
 
 
@@ -117,8 +118,15 @@ class Parser(EquationReader):
                     sections.append((self.at, self.section_kind(), []))
                 elif self.kind in ENDS:
                     self.stray()
+                elif kind in ELEMENT_SECTIONS and (section := self.forgotten_section()):
+                    self.note(self.at, f"found an equation or a statement, expected '{section}' before it")
+                    sections.append((self.at, section, []))
                 elif kind in ELEMENT_SECTIONS:
                     items.append(self.element())
+                    if (
+                        self.kind != ";" and self.forgotten_section()
+                    ):  # no element follows: more than the `;` is missing
+                        self.refuse("';'")
                     self.close()
                 else:
                     items.extend(self.section_items(kind.split()[-1]))
@@ -135,6 +143,17 @@ class Parser(EquationReader):
     def section_kind(self) -> str:
         """The words that begin a section."""
         return f"{self.advance()} {self.advance()}" if self.kind == "initial" else self.advance()
+
+    def forgotten_section(self) -> str:
+        """The section whose first word is missing before an equation or a statement; "" before an element."""
+        i, kinds = self.i, self.kinds
+        if kinds[i] in ("connect", "der", *BLOCKS):
+            return "algorithm" if kinds[i] == "while" else "equation"
+        if kinds[i] != "name" or not self.texts[i][0].islower():  # a type begins with a capital
+            return ""
+        while kinds[i] in IN_REFERENCES and (kinds[i] != "name" or kinds[i + 1] != "name"):
+            i += 1
+        return {":=": "algorithm", "=": "equation"}.get(kinds[i], "")
 
     def stray(self) -> None:
         """An `else` or `end if` to which nothing belongs."""

@@ -82,6 +82,10 @@ FAULTS = {  # a text with one fault: its line, its column, and what is said
     "model M\nalgorithm\n  x = 1;\nend M;": (3, 5, "found '=', expected ':=', as '=' is for equations"),
     "model M\nequation\n  if a the\n  x = 1;\n  else\n  x = 2;\n  end if;\nend M;": (3, 8, "found 'the', expected 'then'"),
     "model M\nequation\n  if a then\n  x = 1;\nend M;": (5, 1, "found 'end M', expected 'end if'"),
+    "model M\nequation\n  if a then\n  x = 1;\n  end;\n  y = 1;\nend M;": (5, 3, "found 'end', expected 'end if'"),
+    "model M\n  Real x;\n  x = 1;\n  connect(a, b);\nend M;": (
+        3, 3, "found an equation or a statement, expected 'equation' before it",
+    ),
     "model M\nequation\n  for i in 1:2 loop\n  x = 1;\n  end if;\nend M;": (5, 3, "found 'end if', expected 'end for'"),
     "model M\n  Real x;\nend N;": (3, 1, "found 'end N', expected 'end M'"),
     "model M\n  Real x;\nend model;": (3, 1, "found 'end model', expected 'end M'"),
@@ -91,6 +95,7 @@ FAULTS = {  # a text with one fault: its line, its column, and what is said
     "model M\n  Real x = [1, 2; 3 4; 5, 6];\n  Real y;\nend M;": (2, 21, "found 4, expected ']'"),
     "model M\n  Real flow;\nend M;": (2, 8, "found the keyword 'flow', expected a name"),
     "model 3\n  Real x;\nend M;": (1, 7, "found 3, expected a name"),
+    "model M\n  Real x\n    start = 1,\n    min = 0);\n  Real y;\nend M;": (2, 9, "found 'start' in line 3, expected ';'"),
     "model M\n  Real x \"a;\n  Real y \"b\";\nend M;": (
         3, 11, "found 'b', expected ';'; the string before it begins in line 2: is a quote missing?",
     ),
