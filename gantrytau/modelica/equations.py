@@ -74,8 +74,8 @@ class EquationReader(DeclarationReader):
         self.advance()
         found = self.kind
         if found != word:
-            self.note(at, f"found 'end {found}', expected 'end {word}'".replace(" ;", ""))
-        if found in BLOCKS:
+            self.note(at, f"found 'end{'' if found == ';' else ' ' + found}', expected 'end {word}'")
+        if found != ";":
             self.advance()
 
     def equation(self, section: str) -> tree.SimpleEquation | tree.ProcedureCall:

@@ -3,10 +3,10 @@
 from gantrytau.modelica import tree
 from gantrytau.modelica.tokens import Tokens
 
-NOT, RELATION, SUM, TERM, POWER = 3, 4, 5, 6, 7
+OR, AND, NOT, RELATION, SUM, TERM, POWER = 1, 2, 3, 4, 5, 6, 7
 PRECEDENCE = {
-    "or": 1,
-    "and": 2,
+    "or": OR,
+    "and": AND,
     **dict.fromkeys(("<", "<=", ">", ">=", "==", "<>"), RELATION),
     **dict.fromkeys(("+", "-", ".+", ".-"), SUM),
     **dict.fromkeys(("*", "/", ".*", "./"), TERM),

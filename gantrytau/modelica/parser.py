@@ -9,6 +9,7 @@ from gantrytau.modelica.source import SourceText
 from gantrytau.modelica.tokens import BLOCKS, Faulty
 
 IN_REFERENCES = ("name", "number", "[", "]", ".", ":", ",")
+BEHIND_NAMES = CLASS_BEGINS | {"string", "=", "name", "end"}
 ELEMENT_SECTIONS = ("", "public", "protected")
 
 
@@ -88,13 +89,7 @@ class Parser(EquationReader):
         try:
             return self.expect("name")
         except Faulty:
-            if self.next_kind in ("string", "=") or self.kind not in (
-                *CLASS_BEGINS,
-                "string",
-                "=",
-                "name",
-                "end",
-            ):
+            if self.next_kind in ("string", "=") or self.kind not in BEHIND_NAMES:
                 self.advance()  # a keyword or a number that was meant as the name
             return ""
 
@@ -113,6 +108,8 @@ class Parser(EquationReader):
                 if self.kind == "annotation":
                     annotation = self.class_annotation(annotation)
                 elif self.kind == "external":
+                    if external is not None:
+                        self.note(self.at, "found a second external function, expected one")
                     external = self.external_function()
                 elif self.section_begins():
                     sections.append((self.at, self.section_kind(), []))
@@ -123,9 +120,7 @@ class Parser(EquationReader):
                     sections.append((self.at, section, []))
                 elif kind in ELEMENT_SECTIONS:
                     items.append(self.element())
-                    if (
-                        self.kind != ";" and self.forgotten_section()
-                    ):  # no element follows: more than the `;` is missing
+                    if self.kind != ";" and self.forgotten_section():  # more than a `;` is missing
                         self.refuse("';'")
                     self.close()
                 else:
@@ -135,9 +130,7 @@ class Parser(EquationReader):
                 if self.i == start:
                     self.advance()
         self.end_of_class()
-        shown = tuple(
-            tree.ClassSection(a, kind, tuple(items)) for a, kind, items in sections if kind or items
-        )
+        shown = tuple(tree.ClassSection(a, word, tuple(own)) for a, word, own in sections if word or own)
         return tree.Composition(at, extends, arguments, shown, external), annotation
 
     def section_kind(self) -> str:

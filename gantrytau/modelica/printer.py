@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.expressions import PRECEDENCE, RELATION, SUM, TERM
+from gantrytau.modelica.expressions import AND, OR, PRECEDENCE, RELATION, SUM, TERM
 
 OPERAND = 8  # above all operators
 
@@ -30,9 +30,13 @@ def _expression(e: tree.Expression) -> tuple[str, int]:
     if isinstance(e, tree.Number):
         return e.text, OPERAND
     if isinstance(e, tree.Binary):
-        level = PRECEDENCE[e.operator]
-        left = level + (level not in (1, 2, SUM, TERM))  # a < b and a ^ b do not chain
-        return f"{write(e.left, left)} {e.operator} {write(e.right, level + 1)}", level
+        level, behind = PRECEDENCE[e.operator], []
+        chains = level in (OR, AND, SUM, TERM)  # but not a < b and a ^ b
+        while True:  # a sum of a thousand terms is as deep
+            behind.append(f" {e.operator} {write(e.right, level + 1)}")
+            if not (chains and isinstance(e.left, tree.Binary) and PRECEDENCE[e.left.operator] == level):
+                return "".join((write(e.left, level + (not chains)), *reversed(behind))), level
+            e = e.left
     if isinstance(e, tree.Unary):
         if e.operator == "not":
             return f"not {write(e.operand, RELATION)}", RELATION - 1

@@ -26,7 +26,11 @@ TOKEN = re.compile(
     |(?P<other>(?s:.))""",
     re.VERBOSE,
 )
-UNCLOSED = {"/*": "a comment that no '*/' closes", '"': "a string that no quote closes"}
+UNCLOSED = {
+    "/*": "found a comment that no '*/' closes",
+    '"': "found a string that no quote closes",
+    "'": "found a name in quotes that is not closed in its line",
+}
 SECTIONS = frozenset({"public", "protected", "equation", "algorithm", "constraint", "external"})
 BLOCKS = frozenset({"if", "for", "when", "while"})
 MOST = 20  # messages of a file
@@ -65,8 +69,7 @@ class Tokens:
             if kind == "sign" or (kind == "name" and text in keywords):
                 kind = text
             elif kind == "open":
-                words = UNCLOSED.get(text, "a name in quotes that is not closed in its line")
-                self.unclosed = found.start(), f"found {words}"
+                self.unclosed = found.start(), text
                 break
             kinds.append(kind or "")
             texts.append(text)
@@ -117,17 +120,14 @@ class Tokens:
         at = self.at
         if self.unclosed is not None and not self.kind:  # which is told instead
             raise Faulty
-        plain = {
-            "": "the end of the file",
-            "string": "a string",
-            "name": f"'{text}'",
-            "number": text,
-            "other": repr(text),
-        }
-        found = plain.get(self.kind, f"the keyword '{text}'" if text.isalpha() else f"'{text}'")
+        found = {"": "the end of the file", "string": "a string", "number": text, "other": repr(text)}.get(
+            self.kind, f"'{text}'"
+        )
         if self.kind == "end" and self.texts[i + 1].isidentifier():
             found = f"'end {self.texts[i + 1]}'"
-        if self.kind == "name" and text in OPTIMICA:
+        elif self.kind == text and text.isalpha():
+            found = f"the keyword {found}"
+        elif text in OPTIMICA:
             expected += f"; '{text}' is Optimica, which stands in .mop files"
         before = self.starts[i - 1] if i else 0
         if i and self.kinds[i - 1] == "string" and "\n" in self.texts[i - 1]:
@@ -135,7 +135,7 @@ class Tokens:
             expected += f"; the string before it begins in line {line}: is a quote missing?"
         elif (
             i and expected == "';'" and "\n" in self.source.text[before:at]
-        ):  # what is missing is missing up there
+        ):  # it is missing behind the token before
             line = self.source.line_and_column(at)[0]
             length = len(self.texts[i - 1]) + 2 * (self.kinds[i - 1] == "string")
             at, found = before + length, f"{found} in line {line}"
@@ -194,10 +194,9 @@ class Tokens:
         """ModelError with all faults, in the order of the text."""
         faults = sorted(self.faults)
         if self.unclosed is not None:
-            faults.append(self.unclosed)
-            if (
-                "string" in self.unclosed[1]
-            ):  # behind a quote that is missing, text and strings are interchanged
+            at, opening = self.unclosed
+            faults.append((at, UNCLOSED[opening]))
+            if opening == '"':  # behind a quote that is missing, text and strings are interchanged
                 faults = faults[:1]
         if not faults:
             return

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from gantrytau import translate
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import SourceText, parse, read_tree, tree, written
+from gantrytau_models import Pendulum
 
 HERE = Path(__file__).parent
 FILES = sorted(HERE.glob("constructs.mo*"))
@@ -72,6 +74,16 @@ def test_a_tree_has_what_the_text_says():
 def test_operators_bind_as_in_the_specification(short, clear):
     one, other = (read(f"model M equation x = {text}; end M;") for text in (short, clear))
     assert one == other
+
+
+def test_a_sum_of_thousands_of_terms_is_no_deep_tree():
+    terms = " + ".join(f"a[{i}] * b" for i in range(5000))
+    assert terms in written(read(f"model M equation x = {terms}; end M;"))
+
+
+def test_the_flat_text_of_a_translated_model_is_read():
+    flat = read(translate(Pendulum()).equations("modelica"))
+    assert read(written(flat)) == flat
 
 
 FAULTS = {  # a text with one fault: its line, its column, and what is said
