@@ -1,6 +1,7 @@
 """The order of files: the longest first, so that no worker is left with one of them when the others have ended."""
 
 import gc
+import os
 import signal
 from collections import Counter
 from pathlib import Path
@@ -11,6 +12,9 @@ import pytest
 from tests.families import NIGHTLY
 
 TESTS = Path(__file__).parent
+os.environ["GANTRYTAU_CACHE"] = (
+    "off"  # no compilers beside the tests; those of kernels have folders of their own
+)
 LONGEST = (  # ten seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/building/test_compiling.py",
     "notebooks/test_notebooks.py",

@@ -19,8 +19,9 @@ PACKAGES = {
     "gantrytau_fmu": ROOT / "fmu" / "gantrytau_fmu",
 }
 ORDER = {  # a room imports the rooms before it
-    "gantrytau": "door border interruption whole_files progress describing language modelica flattening compiler results "
-    "inputs simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks electrical commands cli",
+    "gantrytau": "door border interruption timing kernels whole_files progress describing language modelica flattening "
+    "compiler results inputs simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks "
+    "electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy "
     "guesses_and_parameters prepared optimize "

@@ -38,6 +38,7 @@ from gantrytau_optimica import Optimum
     **solver_options.OPTIONS,
     refine=solver_options.REFINE,
     starts=solver_options.STARTS,
+    compile=solver_options.COMPILE,
 )
 def optimize(
     problem: ProblemName,

@@ -48,6 +48,7 @@ def optimize(
     max_iterations: int = 1000,
     max_time: float = 300.0,
     progress: Progress | None = None,
+    compile: bool = True,
     record: Any = None,
 ) -> Optimum:
     """Solve an optimal-control problem.
@@ -64,6 +65,8 @@ def optimize(
     starts: first guesses that are tried; `.search` of the answer tells the branches they led to.
     tolerance: of Ipopt; max_time: s, of the whole call: a refinement that is not done ends with its best round;
     progress: called with (iteration, objective), and stage= if it takes it: "round 2 of at most 13: playing back".
+    compile: whether large functions become machine code where there is a C compiler: it is made beside the solve, and kept
+    in the user's cache for later ones; the answer is the same.
     record: a file or folder to which inputs, versions and verdict are written as JSON, whatever the outcome.
     Raises SolveError with `.optimum` and a report when there is no solution, it is not found in time, or Ctrl-C is
     pressed; ModelError for what is written wrongly.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal, TypedDict
 
@@ -46,6 +46,7 @@ class PolicyKeywords(TranscriptionKeywords, total=False):
 
     refine: float | None
     starts: int
+    compile: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class Policy:
     max_iterations: int = 1000
     max_time: float = 300.0
     progress: Progress | None = None
+    compile: bool = True
 
     def __post_init__(self):
         check_words(Policy, vars(self), "")
@@ -102,7 +104,7 @@ class Policy:
     @cached_property
     def transcription(self) -> Collocation:
         """Points and weights in every element, and what may be done with the program."""
-        return METHODS[self.scheme].scheme(self.points)
+        return replace(METHODS[self.scheme].scheme(self.points), compiled=self.compile)
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -22,10 +22,11 @@ def test_the_record_has_the_keywords_and_defaults_of_optimize():
 
 def test_the_keywords_of_other_verbs_are_some_of_these():
     everything = set(PolicyKeywords.__annotations__)
-    assert everything - set(TranscriptionKeywords.__annotations__) == {"refine", "starts"}
+    assert everything - set(TranscriptionKeywords.__annotations__) == {"refine", "starts", "compile"}
     assert everything - set(MeshKeywords.__annotations__) == {
         "refine",
         "starts",
+        "compile",
         "lengths",
         "guess",
         "causality",

@@ -8,7 +8,6 @@ operations are never fused, so that all platforms round alike.
 import importlib.util
 import os
 import re
-import shlex
 import shutil
 import signal
 import subprocess
@@ -21,6 +20,7 @@ from pathlib import Path
 
 from gantrytau.border.refusal import GantryTauError, ModelError
 from gantrytau.interruption import uninterrupted
+from gantrytau.kernels import c_compiler
 from gantrytau_fmu.building.platforms import Platform
 
 UNIT = "fmu.c"  # the one file that is compiled; it includes the others
@@ -112,15 +112,13 @@ def flags(platform: Platform, identifier: str, *, zig: bool) -> list[str]:
 
 
 def _compiler_of_this_machine() -> list[str] | None:
-    named = os.environ.get("CC", "").strip()
-    if named:
-        command = [named] if shutil.which(named) else shlex.split(named, posix=os.name == "posix")
-        if not shutil.which(command[0]):
-            raise NoCompiler(
-                f"CC: found '{named}', expected a command on the PATH; correct or unset this variable"
-            )
-        return command
-    return next(([name] for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
+    command = c_compiler()
+    if command is not None and not shutil.which(command[0]):
+        named = os.environ["CC"].strip()
+        raise NoCompiler(
+            f"CC: found '{named}', expected a command on the PATH; correct or unset this variable"
+        )
+    return command
 
 
 def _run(commands: Mapping[Platform, Sequence[str]], folder: Path, identifier: str) -> dict[Platform, bytes]:

@@ -58,7 +58,8 @@ def _option(function: Callable[..., Any], served: inspect.Parameter, asked: Any)
         says = described(function, served.name) if asked is ... else asked
         info = typer.Option(help=says, show_default=default is not None and default is not served.empty)
     if kind is bool and info.default is ...:
-        info.default = f"--{served.name.replace('_', '-')}"
+        flag = served.name.replace("_", "-")
+        info.default = f"--{flag}/--no-{flag}" if default is True else f"--{flag}"
     if default is None:
         kind = kind | None
     return served.replace(kind=served.KEYWORD_ONLY, annotation=Annotated[kind, info], default=default)

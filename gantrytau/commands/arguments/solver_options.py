@@ -22,6 +22,7 @@ OPTIONS = dict(
     max_time=_option("In s, of the whole work: what was found until then is kept.", SOLVER),
 )
 REFINE = _option("Relative accuracy to refine the mesh to.", MESH, show_default=False)
+COMPILE = _option("Whether large functions become machine code, kept for later solves.", SOLVER)
 STARTS = _option("Number of first guesses to try.", GUESSES, show_default=False)
 
 Guess = Annotated[

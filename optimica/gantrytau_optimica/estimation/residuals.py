@@ -7,7 +7,6 @@ All Jacobians are exact; G_y is factorised once. Bard (1974), Nonlinear Paramete
 equations of the model as constraints.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -18,9 +17,8 @@ from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
 from gantrytau import ModelError
-from gantrytau_optimica.transcription.assemble import Assembled, Term, assemble
+from gantrytau_optimica.transcription.assemble import Assembled
 from gantrytau_optimica.transcription.costs import sample_errors
-from gantrytau_optimica.transcription.layout import Places
 from gantrytau_optimica.transcription.point_functions import running
 from gantrytau_optimica.transcription.program import Program
 
@@ -178,12 +176,11 @@ def residuals(program: Program) -> Residuals:
             scatter = sparse.csr_matrix((np.ones(count), (rows, np.arange(count))), shape=(total, count))
             terms.append(running(places, layout).term(error, element, place, scatter, extra=known))
             sizes.append(count)
-    return Residuals(program, _assembled(places, terms, total), tuple(sizes))
-
-
-def _assembled(places: Places, terms: Sequence[Term], rows: int) -> Assembled:
-    """The residuals as rows of a program without an objective."""
-    return assemble([], terms, sparse.csr_matrix((rows, places.size)), 0)
+    linear = sparse.csr_matrix((total, places.size))
+    assembled = Assembled(
+        [], terms, linear, program.assembled.compiled
+    )  # rows of a program without an objective
+    return Residuals(program, assembled, tuple(sizes))
 
 
 def check_determined(found: Residuals, states: dict[str, list[str]]) -> None:

@@ -12,8 +12,8 @@ and the matrices of these relations are computed once. Nothing is differentiated
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -21,6 +21,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+
+from gantrytau.kernels import kernel
+
+EVALUATIONS = 100  # of the functions of a program, that a solve is expected to take
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -53,6 +57,7 @@ class Term:
         p: ca.MX,
         weights: ca.SX | None = None,
         weight_values: ca.MX | None = None,
+        compiled: bool = False,
     ) -> ca.MX:
         """All copies of an expression of the local variables, stacked into one column."""
         symbols = [self.local, self.parameters, self.constants]
@@ -62,102 +67,118 @@ class Term:
             symbols.append(weights)
             arguments.append(ca.reshape(weight_values, weights.numel(), self.copies))
         function = ca.Function(name, symbols, [result])
+        if compiled:
+            function = kernel(function, calls=EVALUATIONS * self.copies)
         return ca.vec(function.map(self.copies)(*arguments))
 
 
 @dataclass(frozen=True, eq=False)
 class Assembled:
-    """A nonlinear program with its derivative functions, in the form that CasADi's nlpsol takes."""
+    """The program in the form that CasADi's nlpsol takes: minimise the objective terms' sum; the rows are linear w + the
+    constraint terms' sum. Its functions are made when they are first asked for, and not sent to other processes.
 
-    nlp: ca.Function  # (x, p) -> (f, g)
-    grad_f: ca.Function  # (x, p) -> (f, gradient)
-    jac_g: ca.Function  # (x, p) -> (g, Jacobian)
-    variables: int
-    rows: int
-    second: Callable[[], ca.Function]  # makes hess_lag, which not everyone asks for
+    compiled: whether small Jacobians and Hessians are kernels where that pays; nlpsol differentiates `nlp` itself.
+    """
+
+    objective: Sequence[Term]
+    constraints: Sequence[Term]
+    linear: Sparse
+    compiled: bool
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def variables(self) -> int:
+        """Their number."""
+        return self.linear.shape[1]
+
+    @property
+    def rows(self) -> int:
+        """Their number."""
+        return self.linear.shape[0]
+
+    @cached_property
+    def _symbols(self) -> tuple[ca.MX, ca.MX]:
+        """Variables, and parameters, of which there are none."""
+        return ca.MX.sym("x", self.variables), ca.MX.sym("p", 0)
+
+    @cached_property
+    def nlp(self) -> ca.Function:
+        """(x, p) -> (f, g)"""
+        w, p = self._symbols
+        f = sum((self._values(term) for term in self.objective), ca.MX(0))
+        g = sum((self._values(term) for term in self.constraints), ca.mtimes(to_dm(self.linear), w))
+        return ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"])
+
+    @cached_property
+    def grad_f(self) -> ca.Function:
+        """(x, p) -> (f, gradient); nlpsol asks for the second result only: the first is a structural zero."""
+        gradient = self._jacobian(self.objective, sparse.csr_matrix((1, self.variables)))
+        found = [ca.MX(1, 1), ca.densify(gradient.T)]
+        return ca.Function("nlp_grad_f", [*self._symbols], found, ["x", "p"], ["f", "grad_f_x"])
+
+    @cached_property
+    def jac_g(self) -> ca.Function:
+        """(x, p) -> (g, Jacobian), the first a structural zero again."""
+        found = [ca.MX(self.rows, 1), self._jacobian(self.constraints, self.linear)]
+        return ca.Function("nlp_jac_g", [*self._symbols], found, ["x", "p"], ["g", "jac_g_x"])
 
     @cached_property
     def hess_lag(self) -> ca.Function:
-        """(x, p, lam_f, lam_g) -> upper triangle of the Hessian."""
-        return self.second()
+        """(x, p, lam_f, lam_g) -> upper triangle of the Hessian of the Lagrangian."""
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
+        weighted = [(term, lam_f) for term in self.objective] + [(term, lam_g) for term in self.constraints]
+        names = ["x", "p", "lam_f", "lam_g"]
+        found = [self._hessian(weighted)]
+        return ca.Function(
+            "nlp_hess_l", [*self._symbols, lam_f, lam_g], found, names, ["triu_hess_gamma_x_x"]
+        )
 
+    def _values(self, term: Term) -> ca.MX:
+        values = term.call("values", term.values, *self._symbols)
+        return ca.mtimes(to_dm(term.scatter), values)
 
-def assemble(
-    objective: Sequence[Term], constraints: Sequence[Term], linear: Sparse, parameters: int
-) -> Assembled:
-    """The program: minimise the objective terms' sum; the rows are linear w + the constraint terms' sum."""
-    rows, n = linear.shape
-    w, p = ca.MX.sym("x", n), ca.MX.sym("p", parameters)
-    f = sum((_values(term, w, p) for term in objective), ca.MX(0))
-    g = sum((_values(term, w, p) for term in constraints), ca.mtimes(to_dm(linear), w))
-    gradient = _jacobian(objective, sparse.csr_matrix((1, n)), w, p)
-    jacobian = _jacobian(constraints, linear, w, p)
-    # nlpsol asks grad_f and jac_g for their second result only: the first is a structural zero
-    return Assembled(
-        nlp=ca.Function("nlp", [w, p], [ca.densify(f), ca.densify(g)], ["x", "p"], ["f", "g"]),
-        grad_f=ca.Function(
-            "nlp_grad_f", [w, p], [ca.MX(1, 1), ca.densify(gradient.T)], ["x", "p"], ["f", "grad_f_x"]
-        ),
-        jac_g=ca.Function("nlp_jac_g", [w, p], [ca.MX(rows, 1), jacobian], ["x", "p"], ["g", "jac_g_x"]),
-        variables=n,
-        rows=rows,
-        second=lambda: _second(objective, constraints, w, p, rows),
-    )
+    def _jacobian(self, terms: Sequence[Term], linear: Sparse) -> ca.MX:
+        """Jacobian of the rows: nonzeros of the small Jacobians times their scatter and gather factors."""
+        nonzeros, entries = [], []
+        for term in terms:
+            small = ca.jacobian(term.values, term.local)
+            if small.nnz() == 0:
+                continue
+            nonzeros.append(term.call("jacobian", small.nz[:], *self._symbols, compiled=self.compiled))
+            row, column = (np.array(part) for part in small.sparsity().get_triplet())
+            copy = np.arange(term.copies)[:, None]
+            source, rows, up = _expand(term.scatter.tocsc(), (copy * term.values.numel() + row).ravel())
+            inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
+            entries.append((rows[inner], columns, source[inner], up[inner] * down))
+        return _sum_into(entries, nonzeros, linear.tocoo())
 
-
-def _second(
-    objective: Sequence[Term], constraints: Sequence[Term], w: ca.MX, p: ca.MX, rows: int
-) -> ca.Function:
-    """The Hessian of the Lagrangian as nlpsol takes it."""
-    lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", rows)
-    hessian = _hessian([(term, lam_f) for term in objective] + [(term, lam_g) for term in constraints], w, p)
-    names = ["x", "p", "lam_f", "lam_g"]
-    return ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [hessian], names, ["triu_hess_gamma_x_x"])
-
-
-def _values(term: Term, w: ca.MX, p: ca.MX) -> ca.MX:
-    return ca.mtimes(to_dm(term.scatter), term.call("values", term.values, w, p))
-
-
-def _jacobian(terms: Sequence[Term], linear: Sparse, w: ca.MX, p: ca.MX) -> ca.MX:
-    """Jacobian of the rows: nonzeros of the small Jacobians times their scatter and gather factors."""
-    nonzeros, entries = [], []
-    for term in terms:
-        small = ca.jacobian(term.values, term.local)
-        if small.nnz() == 0:
-            continue
-        nonzeros.append(term.call("jacobian", small.nz[:], w, p))
-        row, column = (np.array(part) for part in small.sparsity().get_triplet())
-        copy = np.arange(term.copies)[:, None]
-        source, rows, up = _expand(term.scatter.tocsc(), (copy * term.values.numel() + row).ravel())
-        inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
-        entries.append((rows[inner], columns, source[inner], up[inner] * down))
-    return _sum_into(entries, nonzeros, linear.tocoo())
-
-
-def _hessian(terms: Sequence[tuple[Term, ca.MX]], w: ca.MX, p: ca.MX) -> ca.MX:
-    """Upper triangle of the Hessian of the sum of multiplier * row."""
-    nonzeros, entries = [], []
-    for term, multipliers in terms:
-        weights = ca.SX.sym("weights", term.values.numel())
-        small = ca.triu(ca.hessian(ca.dot(weights, term.values), term.local)[0])
-        if small.nnz() == 0:
-            continue
-        values = ca.mtimes(to_dm(term.scatter.T.tocsr()), multipliers)
-        nonzeros.append(term.call("hessian", small.nz[:], w, p, weights, values))
-        row, column = (np.array(part) for part in small.sparsity().get_triplet())
-        # the other triangle of a small Hessian may reach the upper one of the large
-        mirrored = np.flatnonzero(row != column)
-        number = np.concatenate([np.arange(len(row)), mirrored])
-        row, column = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
-        copy = np.arange(term.copies)[:, None]
-        source, rows, up = _expand(term.gather, (copy * term.local.numel() + row).ravel())
-        inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
-        rows, factor = rows[inner], up[inner] * down
-        place = (copy * small.nnz() + number).ravel()[source][inner]
-        keep = rows <= columns
-        entries.append((rows[keep], columns[keep], place[keep], factor[keep]))
-    return _sum_into(entries, nonzeros, sparse.coo_matrix((w.numel(), w.numel())))
+    def _hessian(self, terms: Sequence[tuple[Term, ca.MX]]) -> ca.MX:
+        """Upper triangle of the Hessian of the sum of multiplier * row."""
+        nonzeros, entries = [], []
+        for term, multipliers in terms:
+            weights = ca.SX.sym("weights", term.values.numel())
+            small = ca.triu(ca.hessian(ca.dot(weights, term.values), term.local)[0])
+            if small.nnz() == 0:
+                continue
+            values = ca.mtimes(to_dm(term.scatter.T.tocsr()), multipliers)
+            nonzeros.append(
+                term.call("hessian", small.nz[:], *self._symbols, weights, values, compiled=self.compiled)
+            )
+            row, column = (np.array(part) for part in small.sparsity().get_triplet())
+            # the other triangle of a small Hessian may reach the upper one of the large
+            mirrored = np.flatnonzero(row != column)
+            number = np.concatenate([np.arange(len(row)), mirrored])
+            row, column = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
+            copy = np.arange(term.copies)[:, None]
+            source, rows, up = _expand(term.gather, (copy * term.local.numel() + row).ravel())
+            inner, columns, down = _expand(term.gather, (copy * term.local.numel() + column).ravel()[source])
+            rows, factor = rows[inner], up[inner] * down
+            place = (copy * small.nnz() + number).ravel()[source][inner]
+            keep = rows <= columns
+            entries.append((rows[keep], columns[keep], place[keep], factor[keep]))
+        return _sum_into(entries, nonzeros, sparse.coo_matrix((self.variables,) * 2))
 
 
 def _expand(matrix: Sparse, lines: Indices) -> tuple[Indices, Indices, Array]:

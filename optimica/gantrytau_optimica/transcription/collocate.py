@@ -24,7 +24,7 @@ from scipy import sparse
 
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit
 from gantrytau_optimica.control.limits import bare_limit, signal_limits
-from gantrytau_optimica.transcription.assemble import Term, assemble
+from gantrytau_optimica.transcription.assemble import Assembled, Term
 from gantrytau_optimica.transcription.costs import differences, running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, lay_out
 from gantrytau_optimica.transcription.mesh import Mesh
@@ -68,7 +68,9 @@ def collocate(
     objective += [term for layout in places.layouts for term in sample_sums(places, layout)]
     linear = [matrix for mine, _, _ in parts for matrix in mine.linear]
     linear.append(sparse.csr_matrix((total - count, places.size)))
-    assembled = assemble(objective, [*terms, *boundary_terms], sparse.vstack(linear).tocsr(), 0)
+    assembled = Assembled(
+        objective, [*terms, *boundary_terms], sparse.vstack(linear).tocsr(), scheme.compiled
+    )
     limits = *unknown_limits(places), *row_limits(groups, total)
     return Program(problem, places, assembled, tuple(groups), *limits, tuple(where))
 

@@ -17,6 +17,7 @@ class Collocation:
     Polynomials through values v at the nodes, (k + 1,) from 0 on, are states within an element; their derivatives are
     those of the model at the points, (k,) in [0, 1]. differentiation: (k + 1, k), the derivative at point j is
     v @ differentiation[:, j]; end: (k + 1,) the value at 1; weights: (k,) of the quadrature over the points.
+    compiled: whether functions of the program become kernels where that pays.
     refinable: whether inputs are free at every point, and the program may be put on other meshes, with borders that move.
     """
 
@@ -27,6 +28,7 @@ class Collocation:
     end: np.ndarray
     weights: np.ndarray
     refinable: bool = True
+    compiled: bool = True
 
     def divided(self, meshes: Sequence[Mesh]) -> list[Mesh]:
         """The meshes on which the program stands, from those of the caller."""

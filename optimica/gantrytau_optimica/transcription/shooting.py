@@ -29,7 +29,7 @@ from gantrytau import ModelError
 from gantrytau.border.refusal import Given
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
 from gantrytau_optimica.control.limits import bare_limit
-from gantrytau_optimica.transcription.assemble import Term, assemble
+from gantrytau_optimica.transcription.assemble import Assembled, Term
 from gantrytau_optimica.transcription.collocate import phase_rows, unknown_limits
 from gantrytau_optimica.transcription.costs import running_costs, sample_sums, without_sums
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, Track, pieces_of
@@ -165,7 +165,7 @@ def shoot(
     terms = [*(term for part in parts for term in _terms(places, *part, total)), *boundary_terms]
     objective = [single_term(places, where, [without_sums(problem)], sparse.csr_matrix([[1.0]]))]
     objective += [term for layout, *_ in parts for term in _costs(places, layout)]
-    assembled = assemble(objective, terms, sparse.vstack(linear).tocsr(), 0)
+    assembled = Assembled(objective, terms, sparse.vstack(linear).tocsr(), scheme.compiled)
     limits = *_stage_limits(places), *row_limits(groups, total)
     return Program(problem, places, assembled, tuple(groups), *limits, tuple(where))
 

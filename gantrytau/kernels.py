@@ -1,0 +1,202 @@
+"""Functions of CasADi as machine code of this computer, kept in the user's cache: the same numbers, many times faster.
+
+Where a kernel is not there yet, the function itself is used while a process of low priority compiles it for later calls; it
+goes on when the caller's process ends. Run as a program, this file is that process. In the folder `kernels` of the cache:
+
+    KEY-DIGEST.so   a kernel; KEY: hash of its function, the compiler and its flags; DIGEST: of its content
+    KEY.work        a folder in which it is compiled, or failed: nobody begins anew within RETRY
+
+The variable GANTRYTAU_CACHE names another folder for the cache; "off" stands for none. Without a compiler or a folder of the
+user's own that can be written to, all functions remain as they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+VARIABLE = "GANTRYTAU_CACHE"
+FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")  # no sum is rounded otherwise than by CasADi
+WORTH = 2e7  # instructions of all calls of a function, 0.1 s in CasADi's virtual machine: fewer are not worth a kernel
+OFTEN = 1e5  # calls: -O1 takes six times as long to compile as -O0 and makes them three times as fast
+MOST = 300_000  # instructions of a function: more take a compiler minutes
+LONGEST = 300.0  # s, that it may take
+RETRY = 3600.0  # s, after which what failed is tried again
+LIMIT = 200_000_000  # bytes of all kernels: beyond it those that were not used for longest are deleted
+PRIORITY = 15  # lower than that of other processes
+LETTERS = 32  # of a hash
+AT_ONCE = 8  # kernels that are compiled at the same time by all processes of a user
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # as CasADi asks for it
+
+
+def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
+    """The function compiled, where that pays, or the function itself.
+
+    calls: how often it is expected to be called; wait: whether to wait for a compiler instead of going on without.
+    """
+    instructions = function.n_instructions()
+    if instructions * calls < WORTH or instructions > MOST:
+        return function
+    try:
+        command, folder = _command("-O1" if calls > OFTEN else "-O0"), kernel_folder()
+        if command is None or folder is None:
+            return function
+        key = _key(function, command)
+        found = _kept(folder, key, function)
+        if found is None:
+            process = _begun(folder, key, function, command)
+            if process is not None and wait:
+                process.wait()
+                found = _kept(folder, key, function)
+            elif process is not None:  # whoever waits for it takes note of its end
+                threading.Thread(target=process.wait, name="kernel", daemon=True).start()
+        return found or function
+    except (OSError, RuntimeError):  # no room or permission; CasADi cannot write this function as C
+        return function
+
+
+def c_compiler() -> list[str] | None:
+    """The command of this machine's C compiler: what CC says, whether it is there or not, else cc, gcc or clang."""
+    named = os.environ.get("CC", "").strip()
+    if named:
+        return [named] if shutil.which(named) else shlex.split(named, posix=os.name == "posix")
+    return next(([name] for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
+
+
+def user_cache() -> Path:
+    """Where programs keep files of this user that they can make again. RuntimeError if there is no home folder."""
+    home = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
+    return Path(home) if home else Path.home() / ".cache"
+
+
+def kernel_folder() -> Path | None:
+    """Where kernels are kept; None if they shall not be, or if others could write there what this process would run."""
+    named = os.environ.get(VARIABLE, "").strip()
+    if named == "off" or getattr(
+        sys, "frozen", False
+    ):  # a frozen program has no Python that could run this file
+        return None
+    folder = (Path(named) if named else user_cache() / "gantrytau") / "kernels"
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if os.name == "posix":
+        about = folder.stat()
+        if about.st_uid != os.getuid() or about.st_mode & 0o022:
+            return None
+    return folder
+
+
+def _command(level: str) -> list[str] | None:
+    """What compiles, with its flags; None if there is no compiler."""
+    command = c_compiler()
+    found = shutil.which(command[0]) if command else None
+    return [found, *command[1:], level, *FLAGS] if command and found else None
+
+
+def _key(function: ca.Function, command: list[str]) -> str:
+    """A hash of all that makes a kernel what it is."""
+    import casadi as ca
+
+    compiler = Path(command[0]).resolve()
+    about = compiler.stat()
+    parts = [
+        ca.__version__,
+        sys.platform,
+        platform.machine(),
+        str(compiler),
+        about.st_size,
+        about.st_mtime_ns,
+    ]
+    text = "\n".join([*map(str, parts), *command, function.serialize()])
+    return hashlib.sha256(text.encode()).hexdigest()[:LETTERS]
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:LETTERS]
+
+
+def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
+    """The kernel of a key; what is damaged is deleted, and what this machine cannot load is not made again for a while."""
+    import casadi as ca
+
+    for path in folder.glob(f"{key}-*"):
+        if _digest(path) == path.stem.partition("-")[2]:
+            try:
+                found = ca.external(function.name(), str(path))
+                os.utime(path)
+                return found
+            except RuntimeError:
+                with suppress(FileExistsError):
+                    (folder / f"{key}.work").mkdir()
+        path.unlink(missing_ok=True)
+    return None
+
+
+def _begun(
+    folder: Path, key: str, function: ca.Function, command: list[str]
+) -> subprocess.Popen[bytes] | None:
+    """The process that compiles a kernel; None where another one does, or too many are at work."""
+    import casadi as ca
+
+    now = time.time()
+    for other in (works := list(folder.glob("*.work"))):
+        if now - other.stat().st_mtime > RETRY:
+            shutil.rmtree(other, ignore_errors=True)
+    if len(works) >= AT_ONCE:
+        return None
+    work = folder / f"{key}.work"
+    try:
+        work.mkdir()
+    except FileExistsError:
+        return None
+    generator = ca.CodeGenerator("kernel.c")
+    generator.add(function)
+    generator.generate(f"{work}{os.sep}")
+    return subprocess.Popen(
+        [sys.executable, "-I", "-S", __file__, str(work), *command],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    )
+
+
+def compile_kernel(work: Path, command: list[str]) -> None:
+    """Compile `kernel.c` in a folder KEY.work into a kernel beside it; a folder in which that failed stays."""
+    if hasattr(os, "nice"):
+        os.nice(PRIORITY)
+    try:
+        subprocess.run([*command, "kernel.c", "-o", "kernel", "-lm"], cwd=work, check=True, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        if os.name == "posix":
+            os.killpg(0, signal.SIGKILL)  # this process and all that the compiler has begun
+        return
+    except (subprocess.SubprocessError, OSError):
+        return
+    made, folder = work / "kernel", work.parent
+    os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
+    shutil.rmtree(work, ignore_errors=True)
+    kernels = sorted(folder.glob("*-*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    size = 0
+    for path in kernels:
+        size += path.stat().st_size
+        if size > LIMIT:
+            path.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    compile_kernel(Path(sys.argv[1]), sys.argv[2:])
