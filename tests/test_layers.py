@@ -19,7 +19,7 @@ PACKAGES = {
     "gantrytau_fmu": ROOT / "fmu" / "gantrytau_fmu",
 }
 ORDER = {  # a room imports the rooms before it
-    "gantrytau": "border interruption whole_files progress describing language flattening compiler results inputs "
+    "gantrytau": "border interruption whole_files progress timing describing language flattening compiler results inputs "
     "simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem control transcription solving failures answers refinement policy "
