@@ -24,6 +24,7 @@ from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
+from gantrytau.timing import timed
 from gantrytau.writing import write_equations
 
 
@@ -120,9 +121,10 @@ def translate(
     equations cannot determine the unknowns, InitializationError if no consistent start is found.
     """
     request = Request(names(given), names(find), names(states or ()))
-    flat = model if isinstance(model, FlatModel) else flatten(model)
-    if units:
-        check_units(flat)
-    if not events:
-        refuse_events(flat)
-    return Dae.of(translate_flat(flat, request))
+    with timed("translating"):
+        flat = model if isinstance(model, FlatModel) else flatten(model)
+        if units:
+            check_units(flat)
+        if not events:
+            refuse_events(flat)
+        return Dae.of(translate_flat(flat, request))

@@ -1,7 +1,7 @@
 """Findings of translation about a model, in words: `check(model)` and `dae.diagnosis`."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
@@ -16,6 +16,7 @@ from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel, Loop, When
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
+from gantrytau.timing import timed
 
 LISTED = 8  # items of a list that are printed
 POOR = 1e4  # condition of the choice of states from which it deserves a remark
@@ -39,7 +40,7 @@ class Diagnosis(Record):
     given value, with the value assumed; moved: start values that were moved, the farthest first; assemblies: the assembly
     taken, and others at the same states; ambiguous: unknowns of switching equations with several solutions at the start,
     of which the nearest is taken; conditions: conditions of whens with their actions; missing: the fault that prevents
-    translation, else "".
+    translation, else ""; timing: seconds of the processor by stage of translation, of `check`.
     """
 
     model: str
@@ -59,6 +60,7 @@ class Diagnosis(Record):
     ambiguous: tuple[str, ...] = ()
     conditions: tuple[str, ...] = ()
     missing: str = ""
+    timing: Mapping[str, float] = field(default_factory=dict, compare=False)
 
     def __str__(self) -> str:
         lines = [f"{self.model}: {self.equations} equations, {self.unknowns} unknowns"]
@@ -108,9 +110,11 @@ def check(model: Model) -> Diagnosis:
     """
     flat: FlatModel | None = None
     try:
-        flat = flatten(model)
-        check_units(flat)
-        return diagnose(translate_flat(flat, Request()))
+        with timed("checking") as timing:
+            flat = flatten(model)
+            check_units(flat)
+            translated = translate_flat(flat, Request())
+        return replace(diagnose(translated), timing=timing)
     except (StructureError, InitializationError) as error:
         if flat is None:
             cls = model if isinstance(model, type) else type(model)

@@ -13,8 +13,9 @@ import numpy as np
 
 from gantrytau.compiler.definitions import Definitions
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.compiler.symbol_spaces import Chains
+from gantrytau.compiler.symbol_spaces import Chains, column
 from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.scalar_arithmetic import depending, negative, plus, times
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative
 
@@ -105,6 +106,8 @@ class _Terms:
 
     def shift(self, factor: float, offset: ca.SX) -> None:
         """One more term of the offset."""
+        if offset is ZERO:
+            return
         self.offset = _plus(self.offset, factor, offset)
         if offset.is_constant():
             self.size += abs(factor * float(offset))
@@ -136,24 +139,16 @@ class _Elimination:
                     variable.start is not None or variable.nominal is not None
                 )
         self.rated = [i for i, e in enumerate(flat.equations) if e.rate is not None]
-        sides = table.to_reduced(
-            ca.vertcat(
-                *(e.residual for e in flat.equations),
-                *(e.rate for e in flat.equations if e.rate is not None),
-            )
-        )
-        names = list(flat.definitions)
-        defined = table.to_reduced(ca.vertcat(*flat.definitions.values())) if names else ca.SX(0, 1)
-        self.defined = dict(zip(names, defined.elements(), strict=True))
-        self.rates = (
-            dict(zip(flat.rates, table.to_reduced(ca.vertcat(*flat.rates.values())).elements(), strict=True))
-            if flat.rates
-            else {}
+        rates = [e.rate for e in flat.equations if e.rate is not None]
+        sides = table.to_reduced(column([*(e.residual for e in flat.equations), *rates]))
+        self.defined, self.rates = (
+            dict(zip(of, table.to_reduced(column(list(of.values()))).elements(), strict=True))
+            for of in (flat.definitions, flat.rates)
         )
         self.definition_symbols = {
             n: s for v in flat.propagated for n, s in zip(v.elements, v.symbol.elements(), strict=True)
         }
-        self.residuals = self._without_constants(ca.SX(sides).elements() if flat.equations else [])
+        self.residuals = self._without_constants(sides.elements())
 
     def run(self) -> Reduced:
         remaining = list(range(len(self.flat.equations)))  # behind them stand the given rates
@@ -181,10 +176,9 @@ class _Elimination:
         # what became 0 == 0 repeats other equations: two ends that both say that they carry no torque
         redundant = [i for i in remaining if self.residuals[i].is_zero()]
         remaining = [i for i in remaining if i not in redundant]
-        names = [n for v in self.flat.variables for n in v.elements]
-        aliases = {n: self.root(n, 0) for n in names}
-        used_names = {n for n in names if aliases[n].root == n and aliases[n].order == 0}
-        unknowns = tuple(n for n in names if n in used_names and n not in self.known)
+        aliases = {n: self.root(n, 0) for v in self.flat.variables for n in v.elements}
+        roots = (n for n, alias in aliases.items() if alias.root == n and alias.order == 0)
+        unknowns = tuple(n for n in roots if n not in self.known)
         compact = [self.residuals[i] for i in remaining]
         definitions = self._definitions(aliases)
         rates = self._substitute(self.residuals[len(self.flat.equations) :])
@@ -224,7 +218,7 @@ class _Elimination:
         """Residuals with those definitions inserted that, with parameters folded in, are numbers after all."""
         done: set[str] = set()
         while True:
-            steady = {n: e for n, e in self.defined.items() if n not in done and self._steady(e)}
+            steady = {n: e for n, e in self._steady().items() if n not in done}
             if not steady:
                 return residuals
             steady = self._without_rounding(steady)
@@ -255,8 +249,12 @@ class _Elimination:
             found.update((n, ZERO) for n, x in numbers.items() if abs(x) <= NOISE * largest)
         return found
 
-    def _steady(self, expression: ca.SX) -> bool:
-        return expression.is_constant() or all(x.name() in self.parameters for x in ca.symvar(expression))
+    def _steady(self) -> dict[str, ca.SX]:
+        """Definitions of parameters alone."""
+        whole = list(self.defined.values())
+        moving = [x for x in ca.symvar(column(whole)) if x.name() not in self.parameters]
+        pairs = zip(self.defined.items(), depending(whole, moving), strict=True)
+        return {name: expression for (name, expression), moves in pairs if not moves}
 
     def root(self, name: str, order: int) -> Alias:
         """What the order-th derivative of a variable is."""
@@ -278,7 +276,8 @@ class _Elimination:
             if not stack:
                 return terms
             node, factor = stack.pop()
-            if node.is_symbolic():
+            operator = node.op()
+            if operator == ca.OP_PARAMETER:
                 name = node.name()
                 if split_derivative(name)[0] in self.defined:
                     return None
@@ -288,21 +287,20 @@ class _Elimination:
                     return None
                 else:
                     terms.add(name, factor, abs(factor))
-            elif node.is_constant():
+            elif operator == ca.OP_CONST:
                 terms.shift(factor, node)
-            elif node.is_op(ca.OP_ADD):
-                stack += [(node.dep(0), factor), (node.dep(1), factor)]
-            elif node.is_op(ca.OP_SUB):
-                stack += [(node.dep(0), factor), (node.dep(1), -factor)]
-            elif node.is_op(ca.OP_NEG):
+            elif operator in (ca.OP_ADD, ca.OP_SUB):
+                sign = 1 if operator == ca.OP_ADD else -1
+                stack += [(node.dep(0), factor), (node.dep(1), sign * factor)]
+            elif operator == ca.OP_NEG:
                 stack.append((node.dep(0), -factor))
-            elif node.is_op(ca.OP_TWICE):
+            elif operator == ca.OP_TWICE:
                 stack.append((node.dep(0), 2 * factor))
-            elif node.is_op(ca.OP_MUL) and node.dep(0).is_constant():
+            elif operator == ca.OP_MUL and node.dep(0).is_constant():
                 stack.append((node.dep(1), factor * float(node.dep(0))))
-            elif node.is_op(ca.OP_MUL) and node.dep(1).is_constant():
+            elif operator == ca.OP_MUL and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor * float(node.dep(1))))
-            elif node.is_op(ca.OP_DIV) and node.dep(1).is_constant():
+            elif operator == ca.OP_DIV and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor / float(node.dep(1))))
             elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
                 terms.shift(factor, node)
@@ -379,16 +377,21 @@ class _Elimination:
 
 def _plus(total: ca.SX, factor: float, offset: ca.SX) -> ca.SX:
     """Total + factor * offset; offsets are nearly always zero, and arithmetic on symbols is slow."""
-    if offset.is_zero():
+    if offset is ZERO or offset.is_zero():
         return total
-    scaled = offset if factor == 1.0 else (-offset if factor == -1.0 else factor * offset)
-    return scaled if total.is_zero() else total + scaled
+    scaled = _scaled(factor, offset)
+    return scaled if total is ZERO or total.is_zero() else plus(total, scaled)
 
 
 def alias_expression(alias: Alias, chains: Chains) -> ca.SX:
     """The alias written out."""
     if alias.root is None:
         return alias.offset
-    symbol = chains.sx(alias.root, alias.order)
-    scaled = symbol if alias.factor == 1.0 else (-symbol if alias.factor == -1.0 else alias.factor * symbol)
-    return _plus(scaled, 1.0, alias.offset)
+    return _plus(_scaled(alias.factor, chains.sx(alias.root, alias.order)), 1.0, alias.offset)
+
+
+def _scaled(factor: float, expression: ca.SX) -> ca.SX:
+    """Factor * expression."""
+    if factor in (1.0, -1.0):
+        return expression if factor == 1.0 else negative(expression)
+    return times(factor, expression)

@@ -86,7 +86,7 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
     symbols = {n: s for p in flat.parameters for n, s in zip(p.elements, p.symbol.elements(), strict=True)}
     bindings = {n: v for p in flat.parameters for n, v in zip(p.elements, p.value, strict=True)}
     folded = {n for p in flat.parameters if p.fold for n in p.elements}
-    needs = {n: [s.name() for s in ca.symvar(v)] for n, v in bindings.items()}
+    needs = {n: [] if v.is_constant() else [s.name() for s in ca.symvar(v)] for n, v in bindings.items()}
     for name, others in needs.items():
         foreign = [other for other in others if other not in bindings]
         if foreign:

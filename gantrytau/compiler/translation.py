@@ -26,13 +26,15 @@ from gantrytau.flattening.flatten import flatten
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.timing import stage, timed
 
 
 def translate_model(model: Model) -> Translated:
     """Flatten a model, check the dimensions of all equations, and translate it; see `gantrytau.translate`."""
-    flat = flatten(model)
-    check_units(flat)
-    return translate_flat(flat, Request())
+    with timed("translating"):
+        flat = flatten(model)
+        check_units(flat)
+        return translate_flat(flat, Request())
 
 
 def translate_flat(
@@ -47,7 +49,8 @@ def translate_flat(
     """
     table, known = _given(flat, request.given)
     doubtful = any(e.dual for e in flat.equations)
-    settled = without_redundant(flat, table, frozenset(known), course) if flat.loops else Settled(flat)
+    with stage("loops"):
+        settled = without_redundant(flat, table, frozenset(known), course) if flat.loops else Settled(flat)
     try:
         return _translated(settled, flat, table, known, request, start or {})
     except StructureError as error:
@@ -78,7 +81,8 @@ def _given(flat: FlatModel, given: Sequence[str]) -> tuple[ParameterTable, tuple
         elif name not in events:
             continue
         raise ModelError(f"{name} {why}, expected variables", place="given", argument="given")
-    table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
+    with stage("parameters"):
+        table = parameter_table(flat, keep=frozenset(n for n in scalars if n in parameters))
     return table, (*(known or flat.inputs), *events)
 
 
@@ -91,7 +95,8 @@ def _translated(
     start: Mapping[str, float],
 ) -> Translated:
     """From the flat model without redundant constraints to the sorted system."""
-    reduced = eliminate_aliases(settled.flat, table, frozenset(known))
+    with stage("aliases"):
+        reduced = eliminate_aliases(settled.flat, table, frozenset(known))
     wanted = _wanted_derivatives(flat, request.find)
     try:
         return _sorted(settled, flat, reduced, known, request, start)
@@ -143,23 +148,29 @@ def _sorted(
 ) -> Translated:
     """The reduced equations differentiated, started and solved block by block."""
     wanted = _wanted_derivatives(flat, request.find)
-    indexed = reduce_index(reduced, flat, wanted)
-    _refuse_differentiated(flat, reduced, indexed, wanted)
+    with stage("index"):
+        indexed = reduce_index(reduced, flat, wanted)
+        _refuse_differentiated(flat, reduced, indexed, wanted)
     asked = start_values(flat, reduced, indexed.symbols(reduced.known))
     better = {n: v for n, v in {**settled.guess, **start}.items() if n in asked.values}
     asked = replace(asked, values={**asked.values, **better}, wished=asked.values)
     try:
-        sample = consistent_start(flat, reduced, indexed, asked)
+        with stage("start"):
+            sample = consistent_start(flat, reduced, indexed, asked)
     except InitializationError as error:
         raise massless(indexed, reduced, flat) or error from None
     states = [_state_name(reduced, n) for name in request.states for n in flat.expand(name)]
-    choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), states, flat.name)
-    unknowns = [n for n in indexed.unknown_symbols() if n not in set(choice.states)]
-    pattern = block_pattern(indexed.incidence, unknowns)
-    by_name = {n: reduced.chains.named(n) for n in unknowns}
-    guide = Guide(sample, reduced.table.values, choice.states)
-    blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
-    refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
+    with stage("states"):
+        choice = choose_states(indexed, reduced, sample, _preferences(flat, reduced), states, flat.name)
+    chosen = set(choice.states)
+    unknowns = [n for n in indexed.unknown_symbols() if n not in chosen]
+    with stage("blocks"):
+        pattern = block_pattern(indexed.incidence, unknowns)
+        by_name = {n: reduced.chains.named(n) for n in unknowns}
+        guide = Guide(sample, reduced.table.values, choice.states)
+        blocks = solve_blocks(pattern.blocks, indexed.residuals, by_name, guide).blocks
+    with stage("determinacy"):
+        refuse_undetermined(blocks, indexed, reduced, asked, sample, flat)
     found = Translated(
         request, flat, reduced, indexed, choice, blocks, known, asked, sample, settled.redundant
     )

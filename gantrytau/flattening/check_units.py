@@ -20,6 +20,7 @@ from gantrytau.flattening.instants import sides
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
+from gantrytau.timing import stage
 
 NUMBER = "number"
 ANY = "any"
@@ -54,7 +55,8 @@ class Dimensioned(NamedTuple):
 
 def check_units(flat: FlatModel) -> None:
     """ModelError naming equation, the two terms and their units, for the first that disagree."""
-    check_equations(flat, flat.equations, flat.initial_equations, _events(flat), _attributes(flat))
+    with stage("units"):
+        check_equations(flat, flat.equations, flat.initial_equations, _events(flat), _attributes(flat))
 
 
 def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:

@@ -1,6 +1,7 @@
 """Connections become equations: potentials are equal, flows sum to zero (Modelica specification 3.6, 9.2)."""
 
 from collections.abc import Iterable, Sequence
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -10,6 +11,7 @@ from gantrytau.flattening.instantiation import Instance
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.language.declarations import Quantity
 from gantrytau.language.model import Connector
+from gantrytau.language.scalar_arithmetic import negative, plus
 from gantrytau.language.statements import Connection, Equation, equality
 from gantrytau.language.symbols import scalars
 
@@ -112,8 +114,9 @@ def _set_equations(
         for row in range(len(columns[0])):
             element = row if len(columns[0]) > 1 else None
             if declaration.kind == "flow":
-                total = sum((s * column[row] for s, column in zip(signs, columns, strict=True)), ca.SX(0))
-                total += sum((sign * closure.flow(name, row) for sign, closure in closures), ca.SX(0))
+                terms = [(s, column[row]) for s, column in zip(signs, columns, strict=True)]
+                terms += [(sign, closure.flow(name, row)) for sign, closure in closures]
+                total = reduce(plus, (x if s > 0 else negative(x) for s, x in terms))
                 equations.append(Equation(total, ca.SX(0), where, "connection", number, element))
             elif declaration.kind != "propagated":
                 equations += [

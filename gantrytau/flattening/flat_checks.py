@@ -1,7 +1,7 @@
 """What cannot be in a model that is written out: numbers that are none, coordinates that do not exist, what jumps."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import casadi as ca
 
@@ -9,6 +9,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.instructions import refuse_calls
+from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
@@ -35,16 +36,24 @@ def refuse_tables(equations: Iterable[Equation]) -> None:
             refuse_calls(equation.name, equation.residual)
 
 
-def refuse_absent(equations: Iterable[Equation], absent: Mapping[str, str]) -> None:
-    """ModelError for an equation with a coordinate that does not exist."""
-    for equation in equations if absent else ():
-        for leaf in ca.symvar(equation.residual):
-            if split_derivative(leaf.name())[0] in absent:
-                name = split_derivative(leaf.name())[0]
-                raise ModelError(
-                    f"{equation.name}: found {name}, which does not exist: {absent[name]}; use the orientation R "
-                    "or angular velocity w of a frame instead"
-                )
+def first_with(
+    equations: Sequence[Equation], names: Iterable[str], wrong: Callable[[str], bool]
+) -> tuple[Equation, str] | None:
+    """The first equation with a symbol of a wrong name, and that name; names: of all symbols in the equations."""
+    if not any(map(wrong, names)):
+        return None
+    leaves = ((equation, leaf.name()) for equation in equations for leaf in ca.symvar(equation.residual))
+    return next((equation, name) for equation, name in leaves if wrong(name))
+
+
+def refuse_absent(equations: Sequence[Equation], names: Iterable[str], absent: Mapping[str, str]) -> None:
+    """ModelError for an equation with a coordinate that does not exist; names: of all symbols in the equations."""
+    if absent and (found := first_with(equations, names, lambda n: split_derivative(n)[0] in absent)):
+        name = split_derivative(found[1])[0]
+        raise ModelError(
+            f"{found[0].name}: found {name}, which does not exist: {absent[name]}; use the orientation R "
+            "or angular velocity w of a frame instead"
+        )
 
 
 def refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
@@ -59,15 +68,14 @@ def refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
             )
 
 
-def refuse_before(equations: Iterable[Equation]) -> None:
+def refuse_before(equations: Sequence[Equation]) -> None:
     """ModelError for a value just before an instant where there is none."""
-    for equation in equations:
-        for leaf in ca.symvar(equation.residual):
-            if leaf.name().startswith("pre("):
-                raise ModelError(
-                    f"{equation.name}: found {leaf.name()}, expected it in when(...) only: an equation holds at all times, "
-                    "and sampled(...) sees the values before anyway; keep the value in a Discrete that a when sets"
-                )
+    names = leaf_names(e.residual for e in equations)
+    if found := first_with(equations, names, lambda n: n.startswith("pre(")):
+        raise ModelError(
+            f"{found[0].name}: found {found[1]}, expected it in when(...) only: an equation holds at all times, "
+            "and sampled(...) sees the values before anyway; keep the value in a Discrete that a when sets"
+        )
 
 
 def refuse_bound(discretes: Iterable[FlatVariable], equations: Iterable[Equation]) -> None:

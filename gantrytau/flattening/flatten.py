@@ -27,15 +27,20 @@ from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
 from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
+from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.self_description.appearance import Shape, shapes_of
 from gantrytau.language.self_description.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality, place_of
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
+from gantrytau.timing import stage
 
 
 def flatten(model: Model) -> FlatModel:
     """The model written out as variables, parameters and equations; ModelError with the path of a fault."""
-    return write_out(instantiate(model))
+    with stage("instantiation"):
+        instance = instantiate(model)
+    with stage("flattening"):
+        return write_out(instance)
 
 
 @dataclass
@@ -101,11 +106,12 @@ def write_out(instance: Instance) -> FlatModel:
         events, sampled, frictions, whens, right = _events(stated, instance, spread)
         refuse_before((*written, *written_initial))
         everything = (*written, *written_initial, *right)
+        names = leaf_names(e.residual for e in everything)
         refuse_tables(everything)
         refuse_nan(everything)
-        spread.refuse_undefined(everything)
+        spread.refuse_undefined(everything, names)
         absent = _absent(statements, tree)
-        refuse_absent(everything, absent)
+        refuse_absent(everything, names, absent)
         refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
         kinds = _kinds(placed)

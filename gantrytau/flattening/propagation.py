@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 
 from gantrytau.border.refusal import ModelError, StructureError
+from gantrytau.flattening.flat_checks import first_with
 from gantrytau.flattening.flat_model import Loop
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.model import Connector
@@ -164,20 +165,26 @@ def propagate(instance: Instance, tree: Tree) -> tuple[dict[str, ca.SX], dict[st
         connector = tree.nodes[path]
         given = _given(path, connector, edge, root, instance, tree)
         for name, declaration in propagated(connector).items():
-            value = ca.densify(ca.SX(given.get(name, declaration.start)))
-            symbols = scalars(getattr(connector, name))
-            if value.numel() != len(symbols):
+            value = given.get(name, declaration.start)
+            elements, symbols = scalars(value), scalars(getattr(connector, name))
+            if len(elements) != len(symbols):
                 raise ModelError(
-                    f"{path}: {name} is given with shape {value.shape}, expected {getattr(connector, name).shape}"
+                    f"{path}: {name} is given with shape {ca.SX(value).shape}, expected {getattr(connector, name).shape}"
                 )
-            leaves = [leaf for leaf in ca.symvar(value) if leaf.name() in plain]
-            if leaves:
-                known = ca.vertcat(*(plain[leaf.name()] for leaf in leaves))
-                value = ca.substitute(value, ca.vertcat(*leaves), known)
-            for symbol, element in zip(symbols, value.elements(), strict=True):
+            for symbol, element in zip(symbols, _without(plain, elements), strict=True):
                 simple = element.is_constant() or element.is_symbolic()
                 (plain if simple else defined)[symbol.name()] = element
     return plain, defined
+
+
+def _without(plain: Mapping[str, ca.SX], elements: list[ca.SX]) -> list[ca.SX]:
+    """Scalars with those of these names replaced."""
+    if all(element.is_symbolic() or element.is_constant() for element in elements):
+        return [plain.get(e.name(), e) if e.is_symbolic() else e for e in elements]
+    value = ca.vertcat(*elements)
+    leaves = [leaf for leaf in ca.symvar(value) if leaf.name() in plain]
+    known = ca.vertcat(*(plain[leaf.name()] for leaf in leaves))
+    return ca.substitute(value, ca.vertcat(*leaves), known).elements() if leaves else elements
 
 
 def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, instance: Instance, tree: Tree):
@@ -245,8 +252,8 @@ class Spread:
             for i, e in enumerate(equations)
         )
 
-    def refuse_undefined(self, equations: Iterable[Equation]) -> None:
-        """StructureError for an orientation that something depends on and nothing determines."""
+    def refuse_undefined(self, equations: Sequence[Equation], names: Iterable[str]) -> None:
+        """StructureError for an orientation that something depends on and nothing determines; names: of all symbols."""
         everything = {
             s.name(): path
             for path, c in self._nodes.items()
@@ -254,12 +261,11 @@ class Spread:
             for s in scalars(getattr(c, n))
         }
         undefined = everything.keys() - self.definitions.keys()
-        for equation in equations if undefined else ():
-            for leaf in ca.symvar(equation.residual):
-                name = split_derivative(leaf.name())[0]
-                if name in undefined:
-                    raise StructureError(
-                        f"{everything[name]}: nothing determines the orientation of this frame, on which "
-                        f"{equation.name} depends: its rotation is free. Connect it to the world through joints, or "
-                        "to a Body, which brings inertia and an orientation of its own"
-                    )
+        if undefined and (
+            found := first_with(equations, names, lambda n: split_derivative(n)[0] in undefined)
+        ):
+            raise StructureError(
+                f"{everything[split_derivative(found[1])[0]]}: nothing determines the orientation of this frame, on which "
+                f"{found[0].name} depends: its rotation is free. Connect it to the world through joints, or "
+                "to a Body, which brings inertia and an orientation of its own"
+            )

@@ -11,6 +11,7 @@ import numpy as np
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.functions import Between
 from gantrytau.language.model import Connector, Declared
+from gantrytau.language.scalar_arithmetic import minus
 from gantrytau.language.symbols import scalars
 
 
@@ -36,7 +37,7 @@ class Equation:
     @cached_property
     def residual(self) -> ca.SX:
         """Left - right."""
-        return self.left - self.right
+        return minus(self.left, self.right)
 
     @property
     def name(self) -> str:

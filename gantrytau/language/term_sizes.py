@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 
 from gantrytau.language.instructions import computed
+from gantrytau.language.scalar_arithmetic import plus, size_of, times
 
 _Sized = tuple[ca.SX, ca.SX]  # an expression, and the size of its terms
 _SUMS = (ca.OP_ADD, ca.OP_SUB, ca.OP_FMIN, ca.OP_FMAX)
@@ -23,7 +24,10 @@ def term_sizes(expressions: Sequence[ca.SX], least: Mapping[str, float] | None =
     dense = [ca.densify(e) for e in expressions]
     (found,) = computed(
         ca.Function("sized", [ca.vertcat(*leaves)], [ca.vertcat(*dense)], {"cse": True}),
-        lambda _, i: (leaves[i], ca.fmax(ca.fabs(leaves[i]), least.get(leaves[i].name(), 0.0))),
+        lambda _, i: (
+            leaves[i],
+            ca.SX.binary(ca.OP_FMAX, size_of(leaves[i]), least.get(leaves[i].name(), 0.0)),
+        ),
         lambda value: (ca.SX(value), ca.SX(abs(value))),
         _operation,
     )
@@ -35,21 +39,22 @@ def _operation(operator: int, operands: list[_Sized]) -> _Sized:
     value = apply(operator, *(e for e, _ in operands))
     a, b = operands[0][1], operands[-1][1]
     if operator in _SUMS:
-        return value, a + b
+        return value, plus(a, b)
     if operator in _SAME:
         return value, a
     if operator == ca.OP_TWICE:
-        return value, 2 * a
+        return value, times(2, a)
     if operator == ca.OP_SQ:
-        return value, 2 * ca.fabs(operands[0][0]) * a
+        return value, times(times(2, size_of(operands[0][0])), a)
     if operator == ca.OP_MUL:
-        return value, a * ca.fabs(operands[1][0]) + ca.fabs(operands[0][0]) * b
+        return value, plus(times(a, size_of(operands[1][0])), times(size_of(operands[0][0]), b))
     if operator == ca.OP_DIV:
-        return value, (a + ca.fabs(value) * b) / ca.fabs(operands[1][0])
+        total = plus(a, times(size_of(value), b))
+        return value, ca.SX.binary(ca.OP_DIV, total, size_of(operands[1][0]))
     if operator == ca.OP_IF_ELSE_ZERO:
         return value, ca.if_else(operands[0][0], b, 0)
     if operator in _TURNING:
         t = ca.SX.sym("t")
         slope = ca.substitute(ca.jacobian(apply(operator, t), t), t, operands[0][0])
-        return value, ca.fabs(value) + ca.fabs(slope) * a
-    return value, ca.fabs(value)
+        return value, plus(size_of(value), times(size_of(slope), a))
+    return value, size_of(value)

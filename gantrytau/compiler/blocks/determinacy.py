@@ -76,6 +76,8 @@ def _free(block: Block, matrix: np.ndarray) -> list[str]:
     """Unknowns that a matrix leaves free."""
     if not np.all(np.isfinite(matrix)):
         return []
+    if matrix.size == 1:
+        return [] if matrix[0, 0] else [block.tears[0].name()]
     rows, columns = balance(matrix, 1)  # units and sizes of bodies count for nothing
     matrix = rows * matrix * columns
     for _ in range(ROUNDS):

@@ -11,6 +11,7 @@ import numpy as np
 
 from gantrytau.compiler.blocks.pivots import reliable
 from gantrytau.language.piecewise import Switched, with_modes
+from gantrytau.language.scalar_arithmetic import depending
 
 RELAXED_PIVOT = 0.1  # smallest pivot relative to its row, at all sample points, that is divided by
 LEAST_PIVOT = 1e-6  # the same of constants, where otherwise nothing could be divided by
@@ -93,8 +94,9 @@ def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
 def moving(jacobian: ca.SX, parameters: Collection[str]) -> set[tuple[int, int]]:
     """Places of a Jacobian that do not depend on parameters alone."""
     rows, columns = jacobian.sparsity().get_triplet()
-    entries = zip(rows, columns, jacobian.nonzeros(), strict=True)
-    return {(i, j) for i, j, e in entries if any(leaf.name() not in parameters for leaf in ca.symvar(e))}
+    others = [leaf for leaf in ca.symvar(jacobian) if leaf.name() not in parameters]
+    places = zip(rows, columns, depending(jacobian.nonzeros(), others), strict=True)
+    return {(i, j) for i, j, moves in places if moves}
 
 
 def _search(
