@@ -24,7 +24,7 @@ from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
-from gantrytau.timing import timed
+from gantrytau.progress import timed
 from gantrytau.writing import write_equations
 
 

@@ -19,7 +19,7 @@ PACKAGES = {
     "gantrytau_fmu": ROOT / "fmu" / "gantrytau_fmu",
 }
 ORDER = {  # a room imports the rooms before it
-    "gantrytau": "door border interruption timing kernels whole_files progress describing language modelica flattening "
+    "gantrytau": "door border interruption kernels whole_files progress describing language modelica flattening "
     "compiler results inputs simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks "
     "electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",

@@ -16,7 +16,7 @@ from gantrytau.flattening.check_units import check_units
 from gantrytau.flattening.flat_model import FlatModel, Loop, When
 from gantrytau.flattening.flatten import flatten
 from gantrytau.language.model import Model
-from gantrytau.timing import timed
+from gantrytau.progress import timed
 
 LISTED = 8  # items of a list that are printed
 POOR = 1e4  # condition of the choice of states from which it deserves a remark

@@ -26,7 +26,7 @@ from gantrytau.flattening.flatten import flatten
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import derivative_name, split_derivative
-from gantrytau.timing import stage, timed
+from gantrytau.progress import stage, timed
 
 
 def translate_model(model: Model) -> Translated:

@@ -20,7 +20,7 @@ from gantrytau.flattening.instants import sides
 from gantrytau.language.instructions import computed
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
-from gantrytau.timing import stage
+from gantrytau.progress import stage
 
 NUMBER = "number"
 ANY = "any"

@@ -32,7 +32,7 @@ from gantrytau.language.self_description.appearance import Shape, shapes_of
 from gantrytau.language.self_description.rods import rods_of
 from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality, place_of
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
-from gantrytau.timing import stage
+from gantrytau.progress import stage
 
 
 def flatten(model: Model) -> FlatModel:
