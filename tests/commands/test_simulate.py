@@ -200,8 +200,8 @@ def test_ctrl_c_leaves_what_was_found(fails, run, tmp_path, monkeypatch):
     press_ctrl_c(monkeypatch)
     file = tmp_path / "part.csv"
     message = fails(INTERRUPTED, "simulate", "Pendulum", "--stop", "10", "--output", file)
-    assert "Pendulum: simulation interrupted at t = 0.2 s\nWhat was computed until then is in " in message
-    assert columns(file)["time [s]"][-1] == pytest.approx(0.2)  # ten of 500 intervals
+    assert "Pendulum: simulation interrupted at t = 1 s\nWhat was computed until then is in " in message
+    assert columns(file)["time [s]"][-1] == pytest.approx(1.0)  # 50 of 500 intervals
     message = fails(INTERRUPTED, "simulate", "Pendulum", "--stop", "10")
     assert "with --output its result would have been saved" in message
 

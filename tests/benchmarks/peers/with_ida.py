@@ -13,7 +13,7 @@ class IDA:
     """One second of a model without inputs from its start, dense linear algebra."""
 
     def __init__(self, coordinates: Coordinates, tolerance: float):
-        from sksundae.ida import IDA as Solver
+        from sksundae.ida import IDA as Solver  # pyright: ignore[reportMissingImports]
 
         x, z, _ = coordinates.start(0.0, np.zeros(0))
         y, rate, factor = (
