@@ -86,9 +86,8 @@ def user_cache() -> Path:
 def kernel_folder() -> Path | None:
     """Where kernels are kept; None if they shall not be, or if others could write there what this process would run."""
     named = os.environ.get(VARIABLE, "").strip()
-    if named == "off" or getattr(
-        sys, "frozen", False
-    ):  # a frozen program has no Python that could run this file
+    frozen = getattr(sys, "frozen", False)  # such a program has no Python that could run this file
+    if named == "off" or frozen:
         return None
     folder = (Path(named) if named else user_cache() / "gantrytau") / "kernels"
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)

@@ -177,10 +177,8 @@ def residuals(program: Program) -> Residuals:
             terms.append(running(places, layout).term(error, element, place, scatter, extra=known))
             sizes.append(count)
     linear = sparse.csr_matrix((total, places.size))
-    assembled = Assembled(
-        [], terms, linear, program.assembled.compiled
-    )  # rows of a program without an objective
-    return Residuals(program, assembled, tuple(sizes))
+    rows = Assembled([], terms, linear, program.assembled.compiled)  # of a program without an objective
+    return Residuals(program, rows, tuple(sizes))
 
 
 def check_determined(found: Residuals, states: dict[str, list[str]]) -> None:

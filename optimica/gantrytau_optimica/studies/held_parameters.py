@@ -31,9 +31,7 @@ def holding(optimum: Optimum, missing: Sequence[str]) -> Optimum:
     new = transcribed_again(program, built.problem, located=(located, borders))
     w = _unknowns(program, new, optimum.solution.w)
     solution = _carried(program, new, optimum.solution, w)
-    if (
-        solution is None
-    ):  # limits in which the parameters occur are rows of their own now, or constants are none
+    if solution is None:  # limits with the parameters are rows of their own now, or constants are none
         solution = Solver(new, SolverSettings()).solve(new, w)
     found = replace(optimum, built=built, program=new, solution=solution)
     size = max(abs(optimum.objective), objective_size(new))
