@@ -133,9 +133,8 @@ class Tokens:
         if i and self.kinds[i - 1] == "string" and "\n" in self.texts[i - 1]:
             line = self.source.line_and_column(before)[0]
             expected += f"; the string before it begins in line {line}: is a quote missing?"
-        elif (
-            i and expected == "';'" and "\n" in self.source.text[before:at]
-        ):  # it is missing behind the token before
+        elif i and expected == "';'" and "\n" in self.source.text[before:at]:
+            # it is missing behind the token before
             line = self.source.line_and_column(at)[0]
             length = len(self.texts[i - 1]) + 2 * (self.kinds[i - 1] == "string")
             at, found = before + length, f"{found} in line {line}"

@@ -60,8 +60,7 @@ def _part(member: str) -> Part:
     numbered = NUMBERED.fullmatch(head)
     head, digits = (numbered[1], (numbered[2],)) if numbered else (head, ())
     letter = GREEK.get(head, head)
-    if (
-        len(letter) == 1 and all(tails) and len(tails) <= MOST_TAILS
-    ):  # v_x, phi_rel, q1; kinetic_energy stays a word
+    # v_x, phi_rel, q1; kinetic_energy stays a word
+    if len(letter) == 1 and all(tails) and len(tails) <= MOST_TAILS:
         return Part(letter, (*digits, *tails, *indices))
     return Part(word, indices)

@@ -91,9 +91,8 @@ class _Listed:
         found, width = fmi_name(name), int(order > 1)
         if name in self.formulas.delays:
             found = f"'{name}'"  # no structured name by itself
-        while (
-            found in self.taken
-        ):  # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
+        # a state may be the derivative of another: der(x), der(x,1), and der(x,2), der(x,02)
+        while found in self.taken:
             width += 1
             found = f"der({base},{order:0{width}})" if order else found + "_"
         self.taken.add(found)

@@ -299,9 +299,8 @@ def _read(fmu: Any, model: Any, journal: Journal) -> None:
 
 
 if __name__ == "__main__":
-    with suppress(
-        ImportError, ValueError
-    ):  # not on Windows; and no file as large as the memory after a crash
+    # not on Windows; and no file as large as the memory after a crash
+    with suppress(ImportError, ValueError):
         limits = import_module("resource")
         limits.setrlimit(limits.RLIMIT_CORE, (0, 0))
     report = Journal(Path(sys.argv[2]))

@@ -56,9 +56,8 @@ def _guessed(flat: FlatModel, guess: Any) -> dict[str, ca.SX]:
     for name, value in guess.items() if isinstance(guess, Mapping) else ():
         try:
             first = np.asarray(value(0.0) if callable(value) else value, dtype=float).ravel(order="F")
-        except (
-            Exception
-        ):  # of a function that is not ours, or another solution: refused or read with the other guesses
+        # of a function that is not ours, or another solution: refused or read with the other guesses
+        except Exception:
             continue
         own = elements.get(name, ())
         if first.size == len(own) and np.all(np.isfinite(first)):

@@ -221,9 +221,8 @@ def solved_by_arcs(
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
     program = transcribed_again(optimum.program, problem, meshes, located)
     held = held_at_limits(program, trajectories) if known else program
-    if np.sum(held.lbg == held.ubg) > np.sum(
-        held.lbw < held.ubw
-    ):  # each arc at a limit leaves less to choose
+    # each arc at a limit leaves less to choose
+    if np.sum(held.lbg == held.ubg) > np.sum(held.lbw < held.ubw):
         problem = without_following(replace(optimum.built, problem=problem))
         program = transcribed_again(optimum.program, problem, meshes, located)
         held = held_at_limits(program, trajectories) if known else program

@@ -93,9 +93,8 @@ def in_frame(
             f" (they miss it by {fitting.left * 1e3:.3g} mm in the median); expected q and r of the same pose in each row, "
             "of a robot with linear guideways",
         )
-    if (
-        fitting.off > NEAR
-    ):  # places on two levels of an axis do not tell guideways apart; forward kinematics may
+    # points on two levels of an axis do not tell guideways apart; forward kinematics may
+    if fitting.off > NEAR:
         by_tool = frame_of(robot.robot, misses_of(links), data)
         fitting = fitting if by_tool is None or by_tool.off > NEAR else by_tool
     if fitting.off > NEAR and (swapped := swapped_carts(links, fitting.off, data.q, data.r, data.R)):
