@@ -175,7 +175,7 @@ def _begun(
 
 
 def compile_kernel(work: Path, command: list[str]) -> None:
-    """Compile `kernel.c` in a folder KEY.work into a kernel beside it; a folder in which that failed stays."""
+    """Compile `kernel.c` of a folder KEY.work and put the kernel beside the folder, which is deleted unless that fails."""
     if hasattr(os, "nice"):
         os.nice(PRIORITY)
     try:

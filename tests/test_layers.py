@@ -393,9 +393,8 @@ def test_an_offence_is_noticed(rule, tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / f"{name}.py").write_text(text)
     (tmp_path / "README.md").write_text(PAGE)
-    (tmp_path / "poses.md").write_text(
-        "# Poses\n\n## How it is laid out\n\n| file | what |\n|---|---|\n| poses | rigid |\n"
-    )
+    page = "# Poses\n\n## How it is laid out\n\n| file | what |\n|---|---|\n| poses | rigid |\n"
+    (tmp_path / "poses.md").write_text(page)
     found = house({path.name: path for path in tmp_path.iterdir() if path.is_dir()})
     pages = ({"gantrytau": tmp_path / "README.md", "gantrytau.kinematics": tmp_path / "poses.md"},)
     assert set(rule(found, *(pages if rule is unmapped else ()))) == expected

@@ -13,7 +13,7 @@ class EquationReader(DeclarationReader):
     """Reads the items of sections; `section` is the last word of their kind: equation, algorithm or constraint."""
 
     def section_items(self, section: str) -> tuple[tree.EquationOrStatement, ...]:
-        """Equations or statements up to what ends them; behind a fault it goes on with the next one."""
+        """Equations or statements of one section; a faulty one is told and left out."""
         items: list[tree.EquationOrStatement] = []
         while self.kind not in ENDS and not self.section_begins() and self.kind != "annotation":
             start = self.i

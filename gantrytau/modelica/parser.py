@@ -165,7 +165,7 @@ class Parser(EquationReader):
         return found
 
     def end_of_class(self) -> None:
-        """`end name`. Where the name is that of a class around this one, it is that one which ends here."""
+        """`end name` of a class; the name of an enclosing class ends that class, as the inner one lacks its `end`."""
         name = self.open_classes.pop()
         if self.kind == "":
             self.refuse(f"'end {name}'" if name else "'end' and a name")

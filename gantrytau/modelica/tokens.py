@@ -1,4 +1,4 @@
-"""From text to tokens, and a cursor over them that notes faults and goes on behind them."""
+"""The tokens of a text, and a cursor over them that collects faults."""
 
 import re
 from typing import NoReturn
@@ -182,7 +182,7 @@ class Tokens:
             self.advance()
 
     def _open_blocks(self, start: int) -> int:
-        """How many blocks are open at the fault: those that began since token `start`, without those that ended."""
+        """Number of blocks that began since token `start` and are still open at the fault."""
         depth = 1
         for i in range(start + 1, self.i):
             if self.kinds[i] in BLOCKS:

@@ -132,7 +132,7 @@ def _divisors(
 
 
 def _matrices(solved: SolvedBlocks) -> list[ca.SX]:
-    """Matrices that must be regular, so that blocks of several unknowns determine them."""
+    """Jacobians of the blocks of several unknowns; each must be regular for its unknowns to be determined."""
     several = [b for b in solved.blocks if len(b.unknowns) > 1 and b.tears]
     return [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in several]
 

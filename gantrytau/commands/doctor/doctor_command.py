@@ -92,7 +92,7 @@ def examine() -> Iterator[Checked]:
 
 
 def package(group: str, wanted: Requirement, extra: str = "") -> Checked:
-    """Whether a package is installed in a sufficient version; extra: the command that installs its extra, if it has one."""
+    """Whether a package is installed and new enough; extra: the command that installs it, where it is optional."""
     try:
         found = importlib.metadata.version(wanted.name)
     except importlib.metadata.PackageNotFoundError:

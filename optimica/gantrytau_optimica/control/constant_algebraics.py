@@ -28,7 +28,7 @@ Constants = dict[int, float]  # by number of the algebraic
 
 
 def without_constants(built: Built, guess: Mapping[str, Any]) -> Built:
-    """The problem without algebraics that never change; what is expressed by them has their numbers instead."""
+    """The problem with numbers in place of the algebraic variables that never change."""
     problem, symbols, numbers = built.problem, [ca.SX(0, 1)], []
     if not built.system.loops:
         return built
@@ -80,7 +80,7 @@ def _constants(problem: ControlProblem, phase: Phase, guesses: Mapping[str, Gues
 def _other_rows(
     problem: ControlProblem, phase: Phase, guesses: Mapping[str, Guess], constants: Constants
 ) -> list[int] | None:
-    """Equations of which all others are combinations, one for each algebraic that is left; None where there are more."""
+    """Indices of independent equations, as many as algebraic variables are left; None if their number differs."""
     count = len(phase.algebraics)
     random = np.random.default_rng(1)
     times, z, others = (np.tile(x, (1, count)) for x in _at(problem, phase, guesses, SHARES))

@@ -79,7 +79,7 @@ def _sized(limits: Sequence[Limit], old: Sequence[Limit]) -> tuple[Limit, ...]:
 
 
 def _unknowns(old: Program, new: Program, w: np.ndarray) -> np.ndarray:
-    """The unknowns (unscaled) of a program on the same meshes, as they are in another one; what is new as it is guessed."""
+    """Unscaled unknowns of the new program: values of the old one by name, first guesses for unknowns it has not."""
     found = first_guess(new)
     for before, layout in zip(old.places.layouts, new.places.layouts, strict=True):
         found[layout.knots] = w[before.knots]
