@@ -12,7 +12,7 @@ from gantrytau.answers.linear_systems.discretisation import held, unheld
 from gantrytau.answers.linear_systems.poles_and_zeros import (
     damping_of,
     in_s,
-    sorted_poles,
+    poles_of,
     transmission_zeros,
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
@@ -57,8 +57,11 @@ class LinearSystem(Record):
 
     @property
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A, (n,) complex, the smallest first: in 1/s, or of a discrete system in z."""
-        return sorted_poles(self.A)
+        """Eigenvalues of A, (n,) complex, the smallest first: in 1/s, or of a discrete system in z.
+
+        Those of free bodies are exactly 0, or 1 in z.
+        """
+        return poles_of(self.A, self.period)
 
     @property
     def zeros(self) -> np.ndarray:
