@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.answers.linear_systems import bode_and_poles
+from gantrytau.answers.linear_systems.closed_loop import channel
 from gantrytau.answers.linear_systems.discretisation import held, unheld
+from gantrytau.answers.linear_systems.margins import Margins, margins_of
 from gantrytau.answers.linear_systems.poles_and_zeros import (
     damping_of,
     in_s,
@@ -155,6 +157,13 @@ class LinearSystem(Record):
         if not np.all(np.diff(times) > 0):
             raise ModelError(f"{name}: found times that do not rise, expected one later than the other")
         return driven(self.A, self.B, self.C, self.D, times, values, start)
+
+    def margins(self, *, output: str | None = None, input: str | None = None) -> Margins:
+        """Gain, phase, delay and disk margins, sensitivity peaks and bandwidth of the loop that u = w - y closes.
+
+        output, input: names, where there are several. Modes that this pair does not touch do not count.
+        """
+        return margins_of(channel(self, "margins", output, input))
 
     def plot_bode(
         self,
