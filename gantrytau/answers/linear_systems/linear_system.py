@@ -18,6 +18,7 @@ from gantrytau.answers.linear_systems.poles_and_zeros import (
     transmission_zeros,
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
+from gantrytau.answers.linear_systems.step_information import StepInformation, response_information
 from gantrytau.answers.linear_systems.system_files import record, save_system
 from gantrytau.border.checks import array, number
 from gantrytau.border.refusal import Given, ModelError
@@ -164,6 +165,20 @@ class LinearSystem(Record):
         output, input: names, where there are several. Modes that this pair does not touch do not count.
         """
         return margins_of(channel(self, "margins", output, input))
+
+    def step_information(self, *, output: str | None = None, input: str | None = None) -> StepInformation:
+        """Final value, rise, overshoot and settling of the response to a step of one, as the system stands.
+
+        output, input: names, where there are several. ModelError where the response comes to no final value.
+        """
+        return response_information(channel(self, "step_information", output, input), impulse=False)
+
+    def impulse_information(self, *, output: str | None = None, input: str | None = None) -> StepInformation:
+        """Peak and settling of the response to an impulse of area one, of a sampled system to one sample of one.
+
+        output, input: names, where there are several. ModelError where the response does not come to rest.
+        """
+        return response_information(channel(self, "impulse_information", output, input), impulse=True)
 
     def plot_bode(
         self,
