@@ -9,6 +9,7 @@ from gantrytau.answers.linear_systems.closed_loop import Channel, loop_frequenci
 from gantrytau.describing.record import Record
 
 REAL = 1e-7  # |Im L| / |L| below which the phase is that of a real number, and no sign is sure
+ROUNDING = 1e-13  # of z - 1, of which little is left at low frequencies
 NEAR = 1e-6  # |Im L| / |L| at a crossing that was found; at a pole on the axis L only jumps
 
 
@@ -84,7 +85,8 @@ def _gains(
     sizes = np.abs(values)
     with np.errstate(invalid="ignore"):
         sine = np.imag(values) / np.where(sizes > 0, sizes, 1.0)
-    known = np.flatnonzero(np.isfinite(sizes) & (np.abs(sine) > REAL))
+    unsure = REAL + (0.0 if loop.period is None else ROUNDING / (hertz * loop.period))
+    known = np.flatnonzero(np.isfinite(sizes) & (np.abs(sine) > unsure))
     found = _crossings(lambda f: float(np.imag(loop.response(np.array([f]))[0])), hertz[known], sine[known])
     rests = [] if np.any(loop.poles == (1 if loop.period else 0)) else [0.0]
     # at 0 and at half of the sampling frequency L is real anyhow
