@@ -35,7 +35,7 @@ def draw_nyquist(
         size = max(size, float(np.abs(shown).max(initial=0.0)))
         axis.plot(np.real(values), np.imag(values), color=f"C{k}", label=label)
         axis.plot(np.real(values), -np.imag(values), color=f"C{k}", linestyle="--", linewidth=0.8)
-        _arrow(axis, values[np.abs(values) < SEEN * 1.2], f"C{k}")
+        _arrow(axis, values, f"C{k}")
     axis.set_aspect("equal")
     axis.set_xlim(-1.1 * size, 1.1 * size)
     axis.set_ylim(-1.1 * size, 1.1 * size)
@@ -149,7 +149,7 @@ def _figure(file: str | os.PathLike[str] | None) -> "tuple[Figure, Axes]":
 
     if file is not None:
         check_suffix(file)
-    figure, axis = plt.subplots(figsize=(6.0, 5.5), layout="constrained")
+    figure, axis = plt.subplots(figsize=(5.7, 5.6), layout="constrained")
     axis.grid(alpha=0.3)
     return figure, axis
 
@@ -162,11 +162,12 @@ def _curve(loop: Channel, frequencies: Any) -> np.ndarray:
 
 def _arrow(axis: "Axes", values: np.ndarray, color: str) -> None:
     """The direction of rising frequency, in the middle of what is shown."""
-    if len(values) < 2:
+    inside = np.abs(values) < SEEN
+    way = np.cumsum(np.abs(np.diff(values)) * (inside[1:] & inside[:-1]))
+    if not way.size or not way[-1]:
         return
-    way = np.cumsum(np.abs(np.diff(values)))
     k = int(np.searchsorted(way, way[-1] / 2))
-    start, end = values[k], values[min(k + 1, len(values) - 1)]
+    start, end = values[k], values[k + 1]
     axis.annotate(
         "",
         (end.real, end.imag),

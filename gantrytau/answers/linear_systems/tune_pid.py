@@ -64,7 +64,8 @@ def tune_pid(
 ) -> PidGains:
     """Gains of `Pid` (of `DiscretePid` for a plant with a period) around one output and one input of a plant.
 
-    By margins: crossover in Hz, where the loop has the gain 1 and a phase margin in deg. By loop shaping, without a
+    By margins: crossover in Hz, where the loop has the gain 1 and a phase margin in deg; `.margins`
+    has the smallest of all crossings. By loop shaping, without a
     crossover: the largest integral gain k / T_i for which |S| stays below M_s (1.4 if neither is given) and |T| below
     M_t (Astrom, Panagopoulos, Hagglund, Design of PI controllers based on non-convex optimization, Automatica 34, 1998).
     A PID has T_i = 4 T_d. k is below zero for a plant that answers downwards. output, input: names, where there are

@@ -34,13 +34,13 @@ def test_root_locus_begins_at_the_poles_and_reaches_the_edge_at_the_gain_margin(
     edge = system.margins().gain[1]
     lines = [drawn(line) for line in system.plot_root_locus().axes[0].lines if line.get_color() == "C0"]
     paths = [line for line in lines if len(line) > 3]
-    assert sorted(path[0].real for path in paths) == pytest.approx(sorted(system.poles.real))
+    assert np.sort([np.real(path[0]) for path in paths]) == pytest.approx(np.sort(np.real(system.poles)))
     ends = [
         drawn(line)[-1]
         for line in system.plot_root_locus([1.0, edge]).axes[0].lines
         if line.get_color() == "C0"
     ]
-    outward = np.max(np.abs(ends[:3]) if period else np.real(ends[:3]))
+    outward = np.max(np.abs(ends[:3]) if period else np.real(np.array(ends[:3])))
     assert outward == pytest.approx(1.0 if period else 0.0, abs=1e-6)
 
 
