@@ -73,26 +73,26 @@ def tune_pid(
     """
     place = "tune_pid"
     check_words(tune_pid, dict(kind=kind))
-    instance(place, "plant", plant, LinearSystem)
+    hertz = None if crossover is None else number(place, "crossover", crossover, unit="Hz", above=0)
+    phase_margin = number(place, "phase_margin", phase_margin, above=0, below=180)
+    peaks = {
+        name: number(place, name, M, above=1) for name, M in (("M_s", M_s), ("M_t", M_t)) if M is not None
+    }
     N = number(place, "N", N, above=0)
-    known = channel(plant, place, output, input)
-    if crossover is not None:
-        half = np.inf if plant.period is None else 0.5 / plant.period
-        crossover = number(place, "crossover", crossover, unit="Hz", above=0, below=half)
-        phase_margin = number(place, "phase_margin", phase_margin, above=0, below=180)
-        if M_s is not None or M_t is not None:
+    instance(place, "plant", plant, LinearSystem)
+    design = _Design(channel(plant, place, output, input), kind, N)
+    if hertz is not None:
+        if peaks:
             words = "expected either a crossover with a phase margin, or bounds on sensitivity peaks"
-            argument = "M_s" if M_t is None else "M_t"
-            raise ModelError(words, place=place, found=Given(argument, M_s if M_t is None else M_t))
-        return _by_margins(_Design(known, kind, N), crossover, phase_margin)
+            raise ModelError(words, place=place, found=Given(*next(iter(peaks.items()))))
+        if plant.period is not None:
+            number(place, "crossover", hertz, unit="Hz", below=0.5 / plant.period)
+        return _by_margins(design, hertz, phase_margin)
     if kind == "PD":
         words = "expected a crossover in Hz: loop shaping looks for the most integral gain, and a PD has none"
         raise ModelError(words, place=place, argument="crossover")
-    bounds = [
-        np.inf if found is None else number(place, name, found, above=1)
-        for name, found in (("M_s", 1.4 if M_s is None and M_t is None else M_s), ("M_t", M_t))
-    ]
-    return _by_shaping(_Design(known, kind, N), bounds[0], bounds[1])
+    peaks = peaks or dict(M_s=1.4)
+    return _by_shaping(design, peaks.get("M_s", np.inf), peaks.get("M_t", np.inf))
 
 
 @dataclass(frozen=True, eq=False)
