@@ -76,6 +76,9 @@ def channel(system: Any, verb: str, output: str | None, input: str | None) -> Ch
     i = _position(place, "output", output, system.outputs)
     B, C, D = system.B[:, [j]], system.C[[i]], system.D[[i]][:, [j]]
     A, B, C = seen_part(system.A, B, C)
+    if not len(A) and not D.item():
+        words = f"found no way from {system.inputs[j]} to {system.outputs[i]}, expected an output that the input moves"
+        raise ModelError(words, place=place, argument="output")
     return Channel(system.title, system.inputs[j], system.outputs[i], A, B, C, D, system.period)
 
 

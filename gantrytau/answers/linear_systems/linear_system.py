@@ -88,14 +88,19 @@ class LinearSystem(Record):
         C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for invalid
         frequencies, and for those above half the sampling frequency of a discrete system, where the response repeats.
         """
+        hertz = self._hertz(frequencies)
+        s = 2j * np.pi * hertz
+        points = s if self.period is None else np.exp(s * self.period)
+        return frequency_response(self.A, self.B, self.C, self.D, points)
+
+    def _hertz(self, frequencies: Any) -> np.ndarray:
+        """Frequencies as (N,) in Hz; ModelError for invalid ones."""
         hertz = np.atleast_1d(array(self.title, "frequencies", frequencies, (), (None,)))
         half = np.inf if self.period is None else 0.5 / self.period
         if np.any(hertz < 0) or np.any(hertz > half * (1 + 1e-12)):
             words = f"expected 0 to {half:g} Hz{'' if self.period is None else ', half of the sampling frequency'}"
             raise ModelError(words, place=self.title, found=Given("frequencies", frequencies))
-        s = 2j * np.pi * hertz
-        points = s if self.period is None else np.exp(s * self.period)
-        return frequency_response(self.A, self.B, self.C, self.D, points)
+        return hertz
 
     def discrete(self, period: float) -> "LinearSystem":
         """The exact discrete system for inputs held between samples (zero-order hold).
@@ -234,7 +239,7 @@ class LinearSystem(Record):
         systems = bode_and_poles.beside_each_other(self, "plot_nyquist", beside)
         loops = {label: channel(one, "plot_nyquist", output, input) for label, one in systems.items()}
         draw = draw_nichols if chart == "nichols" else draw_nyquist
-        return draw(loops, frequencies, file)
+        return draw(loops, None if frequencies is None else self._hertz(frequencies), file)
 
     def plot_root_locus(
         self,

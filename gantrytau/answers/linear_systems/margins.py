@@ -153,4 +153,5 @@ def _bandwidth(loop: Channel, hertz: np.ndarray) -> float:
     if not below.size:
         return np.inf
     k = int(below[0])
-    return brentq(lambda f: size(np.array([f]))[0] - least, hertz[k - 1] if k else 0.0, hertz[k], rtol=1e-12)
+    start = hertz[k - 1] if k else 0.0
+    return brentq(lambda f: size(np.array([f]))[0] - least, start, hertz[k], xtol=1e-300, rtol=1e-12)

@@ -136,4 +136,4 @@ def _last(times: np.ndarray, off: np.ndarray, of: Callable[[float], float], syst
 def _between(of: Callable[[float], float], start: float, end: float) -> float:
     from scipy.optimize import brentq
 
-    return brentq(of, start, end) if of(start) * of(end) < 0 else end
+    return brentq(of, start, end, xtol=1e-12 * end) if of(start) * of(end) < 0 else end

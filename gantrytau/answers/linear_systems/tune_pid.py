@@ -236,7 +236,7 @@ def _most_gain(
             continue
         if i + 1 == GAINS or held[i + 1]:  # beyond, it is another loop
             return float(gains[i])
-        return brentq(excess, gains[i], gains[i + 1])
+        return brentq(excess, gains[i], gains[i + 1], xtol=1e-12 * gains[i])
     return 0.0
 
 

@@ -94,5 +94,7 @@ def test_one_loop_of_several_is_named_and_hidden_modes_do_not_count():
         with pytest.raises(ModelError) as refused:
             wrong()
         assert refused.value.argument == "input"
+    with pytest.raises(ModelError, match=r"no way from u\[1\] to y\[0\]"):
+        system.margins(output="y[0]", input="u[1]")
     with pytest.raises(ModelError, match=r"expected 1 . D not to be zero"):
         StateSpace(-1, 1, 1, -1).margins()

@@ -21,6 +21,13 @@ def test_step_of_second_order_has_overshoot_and_peak_of_the_textbook(w):
     assert found.undershoot == 0.0
 
 
+@pytest.mark.parametrize("rate", [1e-9, 1e9])
+def test_times_of_first_order_have_all_digits_however_fast_it_is(rate):
+    system = StateSpace(-rate, rate, 5.0)
+    assert system.step_information().settling == pytest.approx(np.log(50) / rate, rel=1e-9)
+    assert system.margins().bandwidth == pytest.approx(6 * rate / (2 * np.pi), rel=1e-9)
+
+
 def test_times_of_first_order_are_its_logarithms_beside_a_fast_mode():
     found = StateSpace(np.diag([-0.5, -1e5]), [1, 1e5], [0.5, 0.0]).step_information()
     assert found.rise == pytest.approx(np.log(9) / 0.5, rel=1e-9)
