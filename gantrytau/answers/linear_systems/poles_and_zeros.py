@@ -4,6 +4,7 @@ import numpy as np
 
 ROUNDING = 1e-10  # of the largest singular value, below which a direction of a balanced system is none
 FREE = 1e-13  # of the largest singular value, below which a direction of a balanced system is at rest
+FREE_IN_Z = 1e-11  # the same of A - I with a period: more of it is rounding, that of the matrix exponential
 SAME = 9  # digits to which sizes of poles are compared when they are sorted
 
 
@@ -17,7 +18,7 @@ def poles_of(A: np.ndarray, period: float | None) -> np.ndarray:
 
     shift = 0.0 if period is None else 1.0
     rest, count = np.asarray(matrix_balance(A - shift * np.eye(len(A)), permute=False)[0]), 0
-    least = FREE * max(shift, float(np.linalg.norm(rest, 2)) if rest.size else 0.0)
+    least = max(FREE_IN_Z * shift, FREE * (float(np.linalg.norm(rest, 2)) if rest.size else 0.0))
     while rest.size:
         _, sizes, right = np.linalg.svd(rest)
         free = int(np.sum(sizes <= least))
