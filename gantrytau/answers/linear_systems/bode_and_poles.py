@@ -20,19 +20,25 @@ MOST = 16  # pairs of inputs and outputs that one figure still shows
 POINTS = 2000
 
 
-class Drawn(Protocol):
-    """A linear system, as figures need it."""
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    period: float | None
+class Dynamics(Protocol):
+    """Poles and zeros of a linear system."""
 
     @property
-    def title(self) -> str: ...
+    def period(self) -> float | None: ...
     @property
     def poles(self) -> np.ndarray: ...
     @property
     def zeros(self) -> np.ndarray: ...
+
+
+class Drawn(Dynamics, Protocol):
+    """A linear system, as figures need it."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def title(self) -> str: ...
     def unit(self, name: str) -> str: ...
     def response(self, frequencies: Any) -> np.ndarray: ...
 
@@ -46,7 +52,7 @@ class Spectrum(Protocol):
     def response(self) -> np.ndarray: ...
 
 
-def frequencies_to_draw(system: Drawn) -> np.ndarray:
+def frequencies_to_draw(system: Dynamics) -> np.ndarray:
     """Frequencies in Hz, (N,), from a tenth of the slowest pole or zero to ten times the fastest, dense at resonances."""
     corners = np.concatenate([in_s(system.poles, system.period), in_s(system.zeros, system.period)])
     corners = corners[np.isfinite(corners)]

@@ -97,6 +97,6 @@ def all_stable(poles: np.ndarray, period: float | None) -> bool:
 
 def loop_frequencies(loop: Channel, closed: Channel) -> np.ndarray:
     """Frequencies in Hz, (N,), dense at resonances of the loop, open and closed, and far beyond all poles and zeros."""
-    near = np.concatenate([frequencies_to_draw(loop), frequencies_to_draw(closed)])  # pyright: ignore
+    near = np.concatenate([frequencies_to_draw(loop), frequencies_to_draw(closed)])
     low, high = near.min() / BEYOND, near.max() * (BEYOND if loop.period is None else 1.0)
     return np.unique(np.concatenate([near, np.geomspace(low, high, POINTS)]))

@@ -119,7 +119,7 @@ def draw_root_locus(loop: Channel, gains: Any, file: str | os.PathLike[str] | No
 
 def _gains(loop: Channel) -> np.ndarray:
     """Gains k from zero to where they are nearly at the zeros."""
-    hertz = frequencies_to_draw(loop)  # pyright: ignore
+    hertz = frequencies_to_draw(loop)
     sizes = np.abs(loop.response(hertz))
     sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
     return np.append(0.0, np.geomspace(min(1.0, 0.01 / sizes.max()), max(1.0, 10 / sizes.min()), GAINS))
@@ -156,7 +156,7 @@ def _figure(file: str | os.PathLike[str] | None) -> "tuple[Figure, Axes]":
 
 def _curve(loop: Channel, frequencies: Any) -> np.ndarray:
     """The finite values of L at frequencies (N,) in Hz, else around all poles and zeros."""
-    values = loop.response(frequencies_to_draw(loop) if frequencies is None else frequencies)  # pyright: ignore
+    values = loop.response(frequencies_to_draw(loop) if frequencies is None else frequencies)
     return values[np.isfinite(values) & (values != 0)]
 
 

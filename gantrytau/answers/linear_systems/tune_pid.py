@@ -176,7 +176,7 @@ def _by_shaping(design: _Design, M_s: float, M_t: float) -> PidGains:
     """The largest k / T_i within the bounds, over a grid of times that is refined around the best."""
     from scipy.optimize import minimize_scalar
 
-    hertz = frequencies_to_draw(design.plant)  # pyright: ignore
+    hertz = frequencies_to_draw(design.plant)
     ends = hertz[0], hertz[-1]
     far = np.geomspace(ends[0] / 100, ends[1] * (1000 if design.plant.period is None else 1), 600)
     hertz = np.unique(np.append(hertz, far))
