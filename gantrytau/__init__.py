@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from gantrytau.answers.extraction.extraction import Mechanism, extract_mechanism
     from gantrytau.answers.linear_systems.linear_system import LinearSystem
     from gantrytau.answers.linear_systems.state_space import StateSpace
+    from gantrytau.answers.linear_systems.tune_pid import PidGains, tune_pid
     from gantrytau.answers.linearization import Linearization, linearize
     from gantrytau.border.columns import Columns
     from gantrytau.border.refusal import (
@@ -129,6 +130,7 @@ __all__ = [
     "ModelError",
     "Output",
     "Parameter",
+    "PidGains",
     "Propagated",
     "Real",
     "Result",
@@ -209,6 +211,7 @@ __all__ = [
     "time",
     "transition",
     "translate",
+    "tune_pid",
     "view",
     "when",
     "white_noise",

@@ -20,19 +20,25 @@ MOST = 16  # pairs of inputs and outputs that one figure still shows
 POINTS = 2000
 
 
-class Drawn(Protocol):
-    """A linear system, as figures need it."""
-
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    period: float | None
+class Dynamics(Protocol):
+    """Poles and zeros of a linear system."""
 
     @property
-    def title(self) -> str: ...
+    def period(self) -> float | None: ...
     @property
     def poles(self) -> np.ndarray: ...
     @property
     def zeros(self) -> np.ndarray: ...
+
+
+class Drawn(Dynamics, Protocol):
+    """A linear system, as figures need it."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    @property
+    def title(self) -> str: ...
     def unit(self, name: str) -> str: ...
     def response(self, frequencies: Any) -> np.ndarray: ...
 
@@ -46,7 +52,7 @@ class Spectrum(Protocol):
     def response(self) -> np.ndarray: ...
 
 
-def frequencies_to_draw(system: Drawn) -> np.ndarray:
+def frequencies_to_draw(system: Dynamics) -> np.ndarray:
     """Frequencies in Hz, (N,), from a tenth of the slowest pole or zero to ten times the fastest, dense at resonances."""
     corners = np.concatenate([in_s(system.poles, system.period), in_s(system.zeros, system.period)])
     corners = corners[np.isfinite(corners)]
@@ -124,8 +130,10 @@ def curves_of(systems: Mapping[str, Any], frequencies: Any) -> list["Curves"]:
     return found
 
 
-def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None) -> "Figure":
-    """Gain in the units of the quantities and phase in degrees over frequency in Hz, a column for each input."""
+def draw_bode(
+    system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[str] | None, dB: bool, rad_per_s: bool
+) -> "Figure":
+    """Gain in the units of the quantities or dB, phase in degrees, over frequency, a column for each input."""
     import matplotlib.pyplot as plt
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 
@@ -148,10 +156,13 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
         for j, name in enumerate(system.inputs):
             gain, phase = axes[2 * i, j], axes[2 * i + 1, j]
             for one in curves:
-                _draw_curve(gain, phase, one, one.response[i, j])
+                x = one.hertz * (2 * np.pi if rad_per_s else 1.0)
+                _draw_curve(gain, phase, one, x, one.response[i, j], dB)
             gain.set_xscale("log")
-            gain.set_yscale("log" if any(np.any(abs(one.response[i, j]) > 0) for one in curves) else "linear")
-            gain.set_ylabel(f"gain [{_ratio(system.unit(output), system.unit(name))}]")
+            seen = any(np.any(abs(one.response[i, j]) > 0) for one in curves)
+            gain.set_yscale("log" if seen and not dB else "linear")
+            unit = _ratio(system.unit(output), system.unit(name))
+            gain.set_ylabel(f"gain [{unit if not dB else 'dB' if unit == '1' else f'dB of {unit}'}]")
             gain.set_title(f"{output} over {name}", fontsize="medium")
             phase.set_ylabel("phase [deg]")
             phase.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 1.5, 3, 4.5, 9, 10]))
@@ -159,7 +170,7 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
                 axis.grid(alpha=0.3, which="both")
     ends = axes[0, 0].get_xlim()
     for axis in axes[-1]:
-        axis.set_xlabel("frequency [Hz]")
+        axis.set_xlabel("angular frequency [rad/s]" if rad_per_s else "frequency [Hz]")
         if ends[1] < 500 * ends[0]:  # few powers of ten: 2 and 5 between them, in plain numbers
             axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
@@ -170,16 +181,20 @@ def draw_bode(system: Drawn, curves: Sequence[Curves], file: str | os.PathLike[s
     return finished(figure, file)
 
 
-def _draw_curve(gain: "Axes", phase: "Axes", curve: Curves, values: np.ndarray) -> None:
-    """One response; points have no line, as neighbours scatter. Phases are in the turn of the first curve."""
+def _draw_curve(
+    gain: "Axes", phase: "Axes", curve: Curves, x: np.ndarray, values: np.ndarray, dB: bool
+) -> None:
+    """One response over x; points have no line, as neighbours scatter. Phases are in the turn of the first curve."""
     line, marker = ("none", ".") if curve.points else ("-", "none")
-    gain.plot(curve.hertz, np.abs(values), linestyle=line, marker=marker, markersize=3, label=curve.label)
+    with np.errstate(divide="ignore"):
+        sizes = 20 * np.log10(np.abs(values)) if dB else np.abs(values)
+    gain.plot(x, sizes, linestyle=line, marker=marker, markersize=3, label=curve.label)
     angles = _phase(values)
     if phase.lines and np.any(np.isfinite(angles)):
-        x, first = (np.asarray(of, dtype=float) for of in phase.lines[0].get_data())
-        turns = np.round((angles - np.interp(curve.hertz, x, first)) / 360)  # of noise, each point by itself
+        known, first = (np.asarray(of, dtype=float) for of in phase.lines[0].get_data())
+        turns = np.round((angles - np.interp(x, known, first)) / 360)  # of noise, each point by itself
         angles = angles - 360 * (turns if curve.points else np.nanmedian(turns))
-    phase.semilogx(curve.hertz, angles, linestyle=line, marker=marker, markersize=3)
+    phase.semilogx(x, angles, linestyle=line, marker=marker, markersize=3)
 
 
 def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None) -> "Figure":
@@ -221,7 +236,7 @@ def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None
             )
             shown.append(points)
     if period is None:
-        _around(axis, np.concatenate(shown))
+        around(axis, np.concatenate(shown))
     unit = " [1/s]" if period is None else f" of z, {1 / period:g} Hz"
     axis.set_xlabel(f"real part{unit}")
     axis.set_ylabel(f"imaginary part{unit}")
@@ -231,7 +246,7 @@ def draw_poles(systems: Mapping[str, Drawn], file: str | os.PathLike[str] | None
     return finished(figure, file)
 
 
-def _around(axis: "Axes", points: np.ndarray) -> None:
+def around(axis: "Axes", points: np.ndarray) -> None:
     """Limits that show all points and the imaginary axis."""
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     wide = max(float(np.abs(np.real(points)).max(initial=0.0)), 0.05 * size)

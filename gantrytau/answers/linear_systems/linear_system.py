@@ -3,21 +3,25 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from gantrytau.answers.linear_systems import bode_and_poles
+from gantrytau.answers.linear_systems.closed_loop import channel
 from gantrytau.answers.linear_systems.discretisation import held, unheld
+from gantrytau.answers.linear_systems.loop_pictures import draw_nichols, draw_nyquist, draw_root_locus
+from gantrytau.answers.linear_systems.margins import Margins, margins_of
 from gantrytau.answers.linear_systems.poles_and_zeros import (
     damping_of,
     in_s,
-    sorted_poles,
+    poles_of,
     transmission_zeros,
 )
 from gantrytau.answers.linear_systems.responses import checked_inputs, driven, frequency_response, stepped
+from gantrytau.answers.linear_systems.step_information import StepInformation, response_information
 from gantrytau.answers.linear_systems.system_files import record, save_system
-from gantrytau.border.checks import array, number
+from gantrytau.border.checks import array, check_words, number
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.describing.record import Record
 
@@ -57,8 +61,11 @@ class LinearSystem(Record):
 
     @property
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A, (n,) complex, the smallest first: in 1/s, or of a discrete system in z."""
-        return sorted_poles(self.A)
+        """Eigenvalues of A, (n,) complex, the smallest first: in 1/s, or of a discrete system in z.
+
+        Those of free bodies are exactly 0, or 1 in z.
+        """
+        return poles_of(self.A, self.period)
 
     @property
     def zeros(self) -> np.ndarray:
@@ -81,14 +88,19 @@ class LinearSystem(Record):
         C (s I - A)^-1 B + D with s = 2 pi i f, or z = exp(2 pi i f period); infinite at a pole. ModelError for invalid
         frequencies, and for those above half the sampling frequency of a discrete system, where the response repeats.
         """
+        hertz = self._hertz(frequencies)
+        s = 2j * np.pi * hertz
+        points = s if self.period is None else np.exp(s * self.period)
+        return frequency_response(self.A, self.B, self.C, self.D, points)
+
+    def _hertz(self, frequencies: Any) -> np.ndarray:
+        """Frequencies as (N,) in Hz; ModelError for invalid ones."""
         hertz = np.atleast_1d(array(self.title, "frequencies", frequencies, (), (None,)))
         half = np.inf if self.period is None else 0.5 / self.period
         if np.any(hertz < 0) or np.any(hertz > half * (1 + 1e-12)):
             words = f"expected 0 to {half:g} Hz{'' if self.period is None else ', half of the sampling frequency'}"
             raise ModelError(words, place=self.title, found=Given("frequencies", frequencies))
-        s = 2j * np.pi * hertz
-        points = s if self.period is None else np.exp(s * self.period)
-        return frequency_response(self.A, self.B, self.C, self.D, points)
+        return hertz
 
     def discrete(self, period: float) -> "LinearSystem":
         """The exact discrete system for inputs held between samples (zero-order hold).
@@ -153,21 +165,47 @@ class LinearSystem(Record):
             raise ModelError(f"{name}: found times that do not rise, expected one later than the other")
         return driven(self.A, self.B, self.C, self.D, times, values, start)
 
+    def margins(self, *, output: str | None = None, input: str | None = None) -> Margins:
+        """Gain, phase, delay and disk margins, sensitivity peaks and bandwidth of the loop that u = w - y closes.
+
+        output, input: names, where there are several. Modes that this pair does not touch do not count.
+        """
+        return margins_of(channel(self, "margins", output, input))
+
+    def step_information(self, *, output: str | None = None, input: str | None = None) -> StepInformation:
+        """Final value, rise, overshoot and settling of the response to a step of one, as the system stands.
+
+        output, input: names, where there are several. ModelError where the response comes to no final value.
+        """
+        return response_information(channel(self, "step_information", output, input), impulse=False)
+
+    def impulse_information(self, *, output: str | None = None, input: str | None = None) -> StepInformation:
+        """Peak and settling of the response to an impulse of area one, of a sampled system to one sample of one.
+
+        output, input: names, where there are several. ModelError where the response does not come to rest.
+        """
+        return response_information(channel(self, "impulse_information", output, input), impulse=True)
+
     def plot_bode(
         self,
         frequencies: Any = None,
         *,
         beside: "Mapping[str, LinearSystem | bode_and_poles.Spectrum] | None" = None,
+        dB: bool = False,
+        rad_per_s: bool = False,
         file: str | os.PathLike[str] | None = None,
     ) -> "Figure":
-        """Gain and phase over frequency in Hz, each output over each input; saved to `file` if one is named.
+        """Gain and phase over frequency, each output over each input; saved to `file` if one is named.
 
-        frequencies: (N,) in Hz, else around all poles and zeros. beside: name -> another system with as many outputs and
+        frequencies: (N,) in Hz, else around all poles and zeros. dB, rad_per_s: whether the axes show gains in dB, and
+        angular frequencies. beside: name -> another system with as many outputs and
         inputs, or a measured spectrum with `hertz` (N,) and a complex `response` (outputs, inputs, N).
         ModelError for systems and spectra of another shape.
         """
         systems = bode_and_poles.beside_each_other(self, "plot_bode", beside, spectra=True)
-        return bode_and_poles.draw_bode(self, bode_and_poles.curves_of(systems, frequencies), file)
+        return bode_and_poles.draw_bode(
+            self, bode_and_poles.curves_of(systems, frequencies), file, dB, rad_per_s
+        )
 
     def plot_poles(
         self,
@@ -181,6 +219,44 @@ class LinearSystem(Record):
         """
         systems = bode_and_poles.beside_each_other(self, "plot_poles", beside)
         return bode_and_poles.draw_poles(systems, file)
+
+    def plot_nyquist(
+        self,
+        frequencies: Any = None,
+        *,
+        chart: Literal["nyquist", "nichols"] = "nyquist",
+        output: str | None = None,
+        input: str | None = None,
+        beside: "Mapping[str, LinearSystem] | None" = None,
+        file: str | os.PathLike[str] | None = None,
+    ) -> "Figure":
+        """The loop that u = w - y closes, in the plane of L with -1; "nichols": in dB over degrees with contours of |T|.
+
+        frequencies: (N,) in Hz, else around all poles and zeros. output, input: names, where there are several.
+        beside: other systems by their names, with this output and input; file: where it is saved.
+        """
+        check_words(LinearSystem.plot_nyquist, dict(chart=chart), f"{self.title}.plot_nyquist")
+        systems = bode_and_poles.beside_each_other(self, "plot_nyquist", beside)
+        loops = {label: channel(one, "plot_nyquist", output, input) for label, one in systems.items()}
+        draw = draw_nichols if chart == "nichols" else draw_nyquist
+        return draw(loops, None if frequencies is None else self._hertz(frequencies), file)
+
+    def plot_root_locus(
+        self,
+        gains: Any = None,
+        *,
+        output: str | None = None,
+        input: str | None = None,
+        file: str | os.PathLike[str] | None = None,
+    ) -> "Figure":
+        """Poles of the loop closed by u = k (w - y) for rising gains k, from the poles to the zeros of the system.
+
+        gains: (N,), else those between which poles move. output, input: names, where there are several. file: where it is
+        saved. Modes that this pair does not touch are not drawn.
+        """
+        loop = channel(self, "plot_root_locus", output, input)
+        values = None if gains is None else array(f"{self.title}.plot_root_locus", "gains", gains, (None,))
+        return draw_root_locus(loop, values, file)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write names and matrices: .json (with poles), .npz (arrays A, B, C, D by name) or .csv (one table); the path.

@@ -3,12 +3,42 @@
 import numpy as np
 
 ROUNDING = 1e-10  # of the largest singular value, below which a direction of a balanced system is none
+FREE = 1e-13  # of the largest singular value, below which a direction of a balanced system is at rest
+FREE_IN_Z = 1e-11  # the same of A - I with a period: more of it is rounding, that of the matrix exponential
 SAME = 9  # digits to which sizes of poles are compared when they are sorted
+
+
+def poles_of(A: np.ndarray, period: float | None) -> np.ndarray:
+    """Poles of a system, sorted: those of free bodies are exactly 0, with a period exactly 1 in z.
+
+    Free directions: null space of A (with a period of A - I) and of its powers, removed by orthogonal similarity until
+    the rest has full rank. Eigenvalues alone would give +-1e-8 for a double pole at zero.
+    """
+    from scipy.linalg import matrix_balance
+
+    shift = 0.0 if period is None else 1.0
+    rest, count = np.asarray(matrix_balance(A - shift * np.eye(len(A)), permute=False)[0]), 0
+    least = max(FREE_IN_Z * shift, FREE * (float(np.linalg.norm(rest, 2)) if rest.size else 0.0))
+    while rest.size:
+        _, sizes, right = np.linalg.svd(rest)
+        free = int(np.sum(sizes <= least))
+        if not free:
+            break
+        kept = right[: len(rest) - free]
+        rest, count = kept @ rest @ kept.T, count + free
+    if not count:
+        return sorted_poles(A)
+    others = np.linalg.eigvals(rest) + shift if rest.size else np.zeros(0)
+    return _sorted(np.concatenate([np.full(count, shift), others]))
 
 
 def sorted_poles(A: np.ndarray) -> np.ndarray:
     """Eigenvalues of A (n, n), (n,) complex, the smallest first, a negative imaginary part before its positive one."""
-    found = np.asarray(np.linalg.eigvals(A), dtype=complex)
+    return _sorted(np.linalg.eigvals(A))
+
+
+def _sorted(values: np.ndarray) -> np.ndarray:
+    found = np.asarray(values, dtype=complex)
     sizes = np.abs(found)
     with np.errstate(divide="ignore"):
         digits = np.where(sizes > 0, np.floor(np.log10(np.where(sizes > 0, sizes, 1.0))), 0.0)
@@ -32,6 +62,19 @@ def transmission_zeros(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarra
     return sorted_poles(A - B @ np.linalg.solve(D, C) if len(D) else A)
 
 
+def seen_part(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A, B, C in the states alone that inputs reach and outputs see: the response is the same."""
+    A, B, C, _ = _balanced(A, B, C, np.zeros((len(C), B.shape[1])), states_alone=True)
+    for _ in range(2):  # what is reached, then, transposed, what is seen
+        basis, rank = B, -1
+        while rank < basis.shape[1]:
+            rank = basis.shape[1]
+            left, sizes, _ = np.linalg.svd(np.hstack([basis, A @ basis / (np.linalg.norm(A, 2) or 1.0)]))
+            basis = left[:, : _rank(sizes, basis)]
+        A, B, C = (basis.T @ A @ basis).T, (C @ basis).T, (basis.T @ B).T
+    return A, B, C
+
+
 def damping_of(poles: np.ndarray, period: float | None) -> np.ndarray:
     """-Re(s) / |s| of each pole, 1 where s = 0 is no motion at all; those of a discrete system by s = log(z) / period."""
     s = in_s(poles, period)
@@ -49,9 +92,9 @@ def in_s(poles: np.ndarray, period: float | None) -> np.ndarray:
 
 
 def _balanced(
-    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, states_alone: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The system with balanced units of states, inputs and outputs; its zeros do not change."""
+    """The system with balanced units of states, and of inputs and outputs; its zeros do not change."""
     from scipy.linalg import matrix_balance
 
     n = len(A)
@@ -62,6 +105,8 @@ def _balanced(
     _, (scales, _) = matrix_balance(whole, permute=False, separate=True)
     scales = scales[:n]
     A, B, C = A / scales[:, None] * scales, B / scales[:, None], C * scales
+    if states_alone:
+        return A, B, C, D
     columns = np.linalg.norm(np.vstack([B, D]), axis=0)
     columns = np.where(columns > 0, columns, 1.0)
     B, D = B / columns, D / columns

@@ -6,6 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import scipy.signal as signal
+from scipy.linalg import block_diag
 
 from gantrytau import Input, Model, ModelError, StateSpace, connect, linearize, simulate
 from tests.answers.test_linearization import Oscillator
@@ -26,6 +27,20 @@ def test_oscillator_has_the_poles_and_the_damping_of_the_textbook():
     assert system.eigenfrequencies == pytest.approx([w / (2 * np.pi)] * 2, rel=1e-14)
     assert system.zeros.size == 0
     assert (system.inputs, system.outputs, system.states) == (("u",), ("y",), ("x[0]", "x[1]"))
+
+
+@pytest.mark.parametrize("slow", [1e-2, 1e-5, 1e-8])
+def test_poles_of_a_free_body_are_exactly_zero_and_a_slow_one_beside_it_stays(slow):
+    free, spring = [[0, 1], [0, 0]], [[0, 1], [-1e4, -3]]
+    A = block_diag(free, -slow, spring, -200.0)
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(6, 6)))[0] @ np.diag([1, 10, 0.1, 3, 5, 1])
+    system = StateSpace(turn @ A @ np.linalg.inv(turn), np.ones(6), np.ones(6))
+    poles = system.poles
+    assert np.all(poles[:2] == 0)
+    assert poles[2] == pytest.approx(-slow, abs=1e-11)  # ten times the rounding of 1e4
+    assert np.count_nonzero(poles == 0) == 2
+    assert np.count_nonzero(system.discrete(0.01).poles == 1) == 2
+    assert linearize(Oscillator(spring=dict(c=0.0), damper=dict(d=0.0))).poles.tolist() == [0, 0]
 
 
 def test_frequency_response_is_that_of_scipy():
