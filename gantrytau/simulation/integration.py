@@ -14,7 +14,7 @@ from gantrytau.simulation.between.pulses import functions_of_time, pulses
 from gantrytau.simulation.events.changes import Changes
 from gantrytau.simulation.events.crossings import Crossing, first_crossing, located
 from gantrytau.simulation.events.looks import LEAST_INTERVAL, Looks
-from gantrytau.simulation.events.margins import ROUNDING, Margins
+from gantrytau.simulation.events.margins import ROUNDING, SwitchMargins
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.integrators import MOST_STEPS, WALKED_STEPS, Integrators
 from gantrytau.simulation.memory.past_values import PastValues
@@ -257,7 +257,7 @@ class Run:
         inputs = trail.rows(np.arange(here, here + count)).T
         return np.vstack([trail.t[here : here + count], h, np.arange(count), inputs])
 
-    def _gaps(self, places: np.ndarray) -> Margins | None:
+    def _gaps(self, places: np.ndarray) -> SwitchMargins | None:
         """Margins of the switches at successive points: distance of each from its next turn."""
         if self.changes.by_time.all_foreseen:
             return None
@@ -268,7 +268,7 @@ class Run:
         trail, k, switches = self.trail, self.done, self.coordinates.switches
         low, modes = self.changes.point(k), self.changes.modes(k).copy()
 
-        def look(point: Point) -> Margins:
+        def look(point: Point) -> SwitchMargins:
             x, z, t, w = point
             return switches.gaps(
                 switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes

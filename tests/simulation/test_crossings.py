@@ -29,7 +29,7 @@ from gantrytau import (
 )
 from gantrytau.simulation.between.chatter import accumulate
 from gantrytau.simulation.events.crossings import located
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.poles import without_poles
 from tests.families import first_of
 
@@ -67,9 +67,9 @@ def test_a_crossing_to_which_no_step_leads_is_none():
     def step(low: Any, h: float) -> Any:
         raise RuntimeError("the equations are not finite")
 
-    def look(at: Any) -> Margins:
+    def look(at: Any) -> SwitchMargins:
         one = np.array([[1.0]])
-        return Margins(one * (0.5 - at[2]), -one, 1e-16 * one)
+        return SwitchMargins(one * (0.5 - at[2]), -one, 1e-16 * one)
 
     assert located(point(0.0), point(1.0), 0.5, step, look) is None
     found = located(point(0.0), point(1.0), 0.3, lambda low, h: point(low[2] + h), look)

@@ -17,7 +17,7 @@ POINTS = 600
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class SisoSystem:
     """y over u of a system in the states that u reaches and y sees: A (n, n), B (n, 1), C (1, n), D (1, 1)."""
 
     title: str
@@ -56,7 +56,7 @@ class Channel:
         points = s if self.period is None else np.exp(s * self.period)
         return frequency_response(self.A, self.B, self.C, self.D, points)[0, 0]
 
-    def closed(self, gain: float = 1.0) -> "Channel":
+    def closed(self, gain: float = 1.0) -> "SisoSystem":
         """The loop closed, w to y with u = gain (w - y); ModelError where 1 + gain D is zero."""
         direct = 1 + gain * float(self.D.item())
         if abs(direct) < 1e-12:
@@ -66,10 +66,10 @@ class Channel:
             raise ModelError(f"{words}: the loop determines nothing", place=self.title)
         B = self.B * (gain / direct)
         A, C, D = self.A - B @ self.C, self.C / direct, self.D * (gain / direct)
-        return Channel(self.title, self.input, self.output, A, B, C, D, self.period)
+        return SisoSystem(self.title, self.input, self.output, A, B, C, D, self.period)
 
 
-def channel(system: Any, verb: str, output: str | None, input: str | None) -> Channel:
+def channel(system: Any, verb: str, output: str | None, input: str | None) -> SisoSystem:
     """One output over one input by their names, None where there is one alone; ModelError for other names."""
     place = f"{system.title}.{verb}"
     j = _position(place, "input", input, system.inputs)
@@ -79,7 +79,7 @@ def channel(system: Any, verb: str, output: str | None, input: str | None) -> Ch
     if not len(A) and not D.item():
         words = f"found no way from {system.inputs[j]} to {system.outputs[i]}, expected an output that the input moves"
         raise ModelError(words, place=place, argument="output")
-    return Channel(system.title, system.inputs[j], system.outputs[i], A, B, C, D, system.period)
+    return SisoSystem(system.title, system.inputs[j], system.outputs[i], A, B, C, D, system.period)
 
 
 def _position(place: str, argument: str, found: str | None, names: tuple[str, ...]) -> int:
@@ -95,7 +95,7 @@ def all_stable(poles: np.ndarray, period: float | None) -> bool:
     return bool(np.all(np.real(poles) < -STABLE * np.abs(poles).max(initial=0.0)))
 
 
-def loop_frequencies(loop: Channel, closed: Channel) -> np.ndarray:
+def loop_frequencies(loop: SisoSystem, closed: SisoSystem) -> np.ndarray:
     """Frequencies in Hz, (N,), dense at resonances of the loop, open and closed, and far beyond all poles and zeros."""
     near = np.concatenate([frequencies_to_draw(loop), frequencies_to_draw(closed)])
     low, high = near.min() / BEYOND, near.max() * (BEYOND if loop.period is None else 1.0)

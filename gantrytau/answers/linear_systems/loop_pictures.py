@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau.answers.linear_systems.bode_and_poles import around, frequencies_to_draw
-from gantrytau.answers.linear_systems.closed_loop import Channel
+from gantrytau.answers.linear_systems.closed_loop import SisoSystem
 from gantrytau.answers.linear_systems.poles_and_zeros import transmission_zeros
 from gantrytau.results.figures import check_suffix, finished
 
@@ -21,7 +21,7 @@ STEP = 0.01  # of the largest pole or zero, by which poles of neighbouring gains
 
 
 def draw_nyquist(
-    loops: dict[str, Channel], frequencies: Any, file: str | os.PathLike[str] | None
+    loops: dict[str, SisoSystem], frequencies: Any, file: str | os.PathLike[str] | None
 ) -> "Figure":
     """L over positive frequencies, dashed over negative ones, with -1 and the unit circle."""
     figure, axis = _figure(file)
@@ -45,7 +45,7 @@ def draw_nyquist(
 
 
 def draw_nichols(
-    loops: dict[str, Channel], frequencies: Any, file: str | os.PathLike[str] | None
+    loops: dict[str, SisoSystem], frequencies: Any, file: str | os.PathLike[str] | None
 ) -> "Figure":
     """L in dB over its phase in degrees, with contours of |T| in dB."""
     figure, axis = _figure(file)
@@ -81,7 +81,7 @@ def draw_nichols(
     return _named(figure, axis, loops, file)
 
 
-def draw_root_locus(loop: Channel, gains: Any, file: str | os.PathLike[str] | None) -> "Figure":
+def draw_root_locus(loop: SisoSystem, gains: Any, file: str | os.PathLike[str] | None) -> "Figure":
     """Eigenvalues of A - k B C / (1 + k D) for gains k (N,): open poles as crosses, zeros as circles, k = 1 as dots."""
     figure, axis = _figure(file)
     poles = loop.poles
@@ -117,7 +117,7 @@ def draw_root_locus(loop: Channel, gains: Any, file: str | os.PathLike[str] | No
     return finished(figure, file)
 
 
-def _gains(loop: Channel) -> np.ndarray:
+def _gains(loop: SisoSystem) -> np.ndarray:
     """Gains k from zero to where they are nearly at the zeros."""
     hertz = frequencies_to_draw(loop)
     sizes = np.abs(loop.response(hertz))
@@ -125,7 +125,7 @@ def _gains(loop: Channel) -> np.ndarray:
     return np.append(0.0, np.geomspace(min(1.0, 0.01 / sizes.max()), max(1.0, 10 / sizes.min()), GAINS))
 
 
-def _paths(loop: Channel, gains: np.ndarray, size: float) -> np.ndarray:
+def _paths(loop: SisoSystem, gains: np.ndarray, size: float) -> np.ndarray:
     """Closed poles (N, n) in columns that are continuous, with further gains where they move fast, as where two meet."""
     from scipy.optimize import linear_sum_assignment
 
@@ -154,7 +154,7 @@ def _figure(file: str | os.PathLike[str] | None) -> "tuple[Figure, Axes]":
     return figure, axis
 
 
-def _curve(loop: Channel, frequencies: Any) -> np.ndarray:
+def _curve(loop: SisoSystem, frequencies: Any) -> np.ndarray:
     """The finite values of L at frequencies (N,) in Hz, else around all poles and zeros."""
     values = loop.response(frequencies_to_draw(loop) if frequencies is None else frequencies)
     return values[np.isfinite(values) & (values != 0)]
@@ -177,7 +177,7 @@ def _arrow(axis: "Axes", values: np.ndarray, color: str) -> None:
 
 
 def _named(
-    figure: "Figure", axis: "Axes", loops: dict[str, Channel], file: str | os.PathLike[str] | None
+    figure: "Figure", axis: "Axes", loops: dict[str, SisoSystem], file: str | os.PathLike[str] | None
 ) -> "Figure":
     first = next(iter(loops.values()))
     if len(loops) > 1:

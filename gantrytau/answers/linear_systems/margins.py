@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.answers.linear_systems.closed_loop import Channel, loop_frequencies
+from gantrytau.answers.linear_systems.closed_loop import SisoSystem, loop_frequencies
 from gantrytau.describing.record import Record
 
 REAL = 1e-7  # |Im L| / |L| below which the phase is that of a real number, and no sign is sure
@@ -51,7 +51,7 @@ class Margins(Record):
         return float(np.degrees(2 * np.arctan(self.disk / 2)))
 
 
-def margins_of(loop: Channel) -> Margins:
+def margins_of(loop: SisoSystem) -> Margins:
     """All margins of an open loop."""
     closed = loop.closed()
     hertz = loop_frequencies(loop, closed)
@@ -79,7 +79,7 @@ def _T(L: np.ndarray) -> np.ndarray:
 
 
 def _gains(
-    loop: Channel, hertz: np.ndarray, values: np.ndarray
+    loop: SisoSystem, hertz: np.ndarray, values: np.ndarray
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Factors with their frequencies, below and above 1, at which L passes through -1."""
     sizes = np.abs(values)
@@ -98,7 +98,7 @@ def _gains(
     return max(below, default=(0.0, np.nan)), min(set(factors) - set(below), default=(np.inf, np.nan))
 
 
-def _phases(loop: Channel, hertz: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
+def _phases(loop: SisoSystem, hertz: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
     """The smallest phase margin in deg, where it is, in Hz, and the shortest delay in s that uses one up."""
     with np.errstate(divide="ignore"):
         levels = np.nan_to_num(np.log(np.abs(values)), posinf=700.0, neginf=-700.0)
@@ -140,7 +140,7 @@ def _peak(size: Callable[[np.ndarray], np.ndarray], hertz: np.ndarray) -> tuple[
     return float(sizes[k]), float(places[k])
 
 
-def _bandwidth(loop: Channel, hertz: np.ndarray) -> float:
+def _bandwidth(loop: SisoSystem, hertz: np.ndarray) -> float:
     from scipy.optimize import brentq
 
     def size(f: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gantrytau.answers.linear_systems.closed_loop import Channel
+from gantrytau.answers.linear_systems.closed_loop import SisoSystem
 from gantrytau.answers.linear_systems.discretisation import held
 from gantrytau.answers.linear_systems.poles_and_zeros import in_s
 from gantrytau.answers.linear_systems.responses import driven, stepped
@@ -38,7 +38,7 @@ class StepInformation(Record):
     undershoot: float
 
 
-def response_information(system: Channel, impulse: bool) -> StepInformation:
+def response_information(system: SisoSystem, impulse: bool) -> StepInformation:
     """The information of a step or an impulse response; ModelError where it does not come to rest."""
     if not system.stable:
         pole = max(system.poles, key=lambda p: p.real if system.period is None else abs(p))
@@ -69,7 +69,7 @@ def response_information(system: Channel, impulse: bool) -> StepInformation:
     return StepInformation(final, float(values[k]), float(times[k]), settling, *shares)
 
 
-def _response(system: Channel, impulse: bool) -> tuple[np.ndarray, np.ndarray, Callable[[float], float]]:
+def _response(system: SisoSystem, impulse: bool) -> tuple[np.ndarray, np.ndarray, Callable[[float], float]]:
     """Times, values, and the value at any time; denser at the start, as fast poles act there."""
     A, B, C, D, period = system.A, system.B, system.C, system.D, system.period
     s = in_s(system.poles, period)
@@ -118,13 +118,13 @@ def _with_peak(
     return np.insert(times, at, float(found.x)), np.insert(values, at, -sign * float(found.fun))
 
 
-def _first(times: np.ndarray, off: np.ndarray, of: Callable[[float], float], system: Channel) -> float:
+def _first(times: np.ndarray, off: np.ndarray, of: Callable[[float], float], system: SisoSystem) -> float:
     """When a function that is below zero at first, known as `off` at times, is no longer."""
     k = int(np.argmax(off >= 0))
     return float(times[k]) if k == 0 or system.period else _between(of, times[k - 1], times[k])
 
 
-def _last(times: np.ndarray, off: np.ndarray, of: Callable[[float], float], system: Channel) -> float:
+def _last(times: np.ndarray, off: np.ndarray, of: Callable[[float], float], system: SisoSystem) -> float:
     """From when on a function stays below zero."""
     above = np.flatnonzero(off >= 0)
     if not above.size or above[-1] == len(times) - 1:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau.answers.linear_systems.bode_and_poles import frequencies_to_draw
-from gantrytau.answers.linear_systems.closed_loop import Channel, all_stable, channel
+from gantrytau.answers.linear_systems.closed_loop import SisoSystem, all_stable, channel
 from gantrytau.answers.linear_systems.linear_system import LinearSystem
 from gantrytau.answers.linear_systems.margins import Margins, margins_of
 from gantrytau.answers.linear_systems.state_space import StateSpace
@@ -99,7 +99,7 @@ def tune_pid(
 class _Design:
     """A plant and a controller with one time left open: T_i of a PI, T_d of a PD, of a PID both by their ratio."""
 
-    plant: Channel
+    plant: SisoSystem
     kind: Kind
     N: float
 
@@ -120,15 +120,15 @@ class _Design:
 
     def shape(self, time: float, hertz: np.ndarray) -> np.ndarray:
         """The response of the controller with a gain of one at frequencies (N,) in Hz."""
-        return Channel("", "", "", *self.controller(1.0, time), self.plant.period).response(hertz)
+        return SisoSystem("", "", "", *self.controller(1.0, time), self.plant.period).response(hertz)
 
-    def loop(self, k: float, time: float) -> Channel:
+    def loop(self, k: float, time: float) -> SisoSystem:
         """Controller, then plant."""
         P = self.plant
         A, B, C, D = self.controller(k, time)
         whole = np.block([[P.A, P.B @ C], [np.zeros((len(A), len(P.A))), A]])
         in_, out = np.vstack([P.B @ D, B]), np.hstack([P.C, P.D @ C])
-        return Channel(P.title, P.input, P.output, whole, in_, out, P.D @ D, P.period)
+        return SisoSystem(P.title, P.input, P.output, whole, in_, out, P.D @ D, P.period)
 
     def stable(self, k: float, time: float) -> bool:
         """Whether the closed loop is stable."""

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from gantrytau.simulation.events.crossings import at_zero
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 
 CHATTERS = 50  # hops of a switch one after another: what holds on either side leads back to the other
 MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether they accumulate
@@ -23,7 +23,7 @@ class Chatter:
         self._turned: dict[int, tuple[int, list[float]]] = {}  # switch: hops, times
 
     def found(
-        self, t: float, changed: np.ndarray, before: Margins, whole: np.ndarray
+        self, t: float, changed: np.ndarray, before: SwitchMargins, whole: np.ndarray
     ) -> tuple[np.ndarray, Literal["", "chattering", "accumulating"]]:
         """Switches that turn at an instant, and whether they chatter or accumulate; before: margins; whole: turns."""
         turned = np.flatnonzero(changed if changed.any() else at_zero(before, t, whole))

@@ -15,7 +15,7 @@ from gantrytau.simulation import simulation_errors as run_ends
 from gantrytau.simulation.between.chatter import HOP, Chatter
 from gantrytau.simulation.events.crossings import at_zero, location_errors
 from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.rounds import MOST, Made
 from gantrytau.simulation.events.sticking import HOLDS, WHENS
 from gantrytau.simulation.events.time_events import TimeEvents
@@ -67,7 +67,7 @@ class Changes:
         """A place as a point."""
         return self.trail.x[k], self.trail.z[k], float(self.trail.t[k]), self.trail.inputs(k)
 
-    def margins(self, places: np.ndarray) -> Margins:
+    def margins(self, places: np.ndarray) -> SwitchMargins:
         """The margins at places."""
         return self.coordinates.switches.look(*self.columns(places), self.sizes).blurred(self._rounded)
 
@@ -282,7 +282,7 @@ class Changes:
             names = [*c.discretes, *(c.states[i] for i in c.rounds.places)]
             raise run_ends.set_badly(c.dae, float(self.trail.t[k]), names[bad[0]], self._labels(made.acts))
 
-    def _watch_hops(self, acts: np.ndarray, t: float, before: Margins, after: Margins) -> None:
+    def _watch_hops(self, acts: np.ndarray, t: float, before: SwitchMargins, after: SwitchMargins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
         rates, noise = before.rates[0], before.noise[0]
         passed = at_zero(before, t, self.coordinates.switches.whole(before.values)) & (rates != 0)
@@ -390,7 +390,7 @@ class Changes:
         if slips and found is not None:
             self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
 
-    def _watch_chatter(self, k: int, changed: np.ndarray, before: Margins) -> None:
+    def _watch_chatter(self, k: int, changed: np.ndarray, before: SwitchMargins) -> None:
         """SolveError if what states made switch turns again and again, and does not leave zero in between or accumulates."""
         dae, t = self.coordinates.dae, float(self.trail.t[k])
         turned, what = self._chatter.found(t, changed, before, self.coordinates.switches.whole(before.values))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.border.refusal import SolveError
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.singular_poses import Point
 
 DEEP = 0.5  # of the lower end: a dip between two places that may reach below that is looked at
@@ -25,7 +25,7 @@ class Crossing:
     certain: bool
 
 
-def first_crossing(t: np.ndarray, gaps: Margins) -> Crossing | None:
+def first_crossing(t: np.ndarray, gaps: SwitchMargins) -> Crossing | None:
     """The first step between places t (n,) in s in which a gap falls below zero, or may dip below it."""
     h = np.diff(t)[:, None]
     g0, g1 = gaps.values[:-1], gaps.values[1:]
@@ -67,7 +67,7 @@ def located(
     high: Point,
     guess: float,
     step: Callable[[Point, float], Point],
-    look: Callable[[Point], Margins],
+    look: Callable[[Point], SwitchMargins],
 ) -> Point | None:
     """The point just behind the first crossing after `low`, up to `high`, which lies behind it; None if no step leads there.
 
@@ -107,13 +107,13 @@ def located(
     return high if end == high[2] else None
 
 
-def at_zero(margins: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+def at_zero(margins: SwitchMargins, t: float, whole: np.ndarray) -> np.ndarray:
     """Which margins of a place are where they turn, as well as that is located, (switches,)."""
     rest = np.abs(margins.values - whole)[0]
     return rest <= 2 * JUST_BEHIND * margins.noise[0] + 8 * np.spacing(abs(t)) * np.abs(margins.rates[0])
 
 
-def location_errors(before: Margins, after: Margins, t: float, whole: np.ndarray) -> np.ndarray:
+def location_errors(before: SwitchMargins, after: SwitchMargins, t: float, whole: np.ndarray) -> np.ndarray:
     """How far from zero margins are that were located as zero before a jump and took no part in it, (switches,)."""
     same = np.abs(after.values - before.values)[0] <= after.noise[0]
     rest = np.abs(before.values - whole)[0]

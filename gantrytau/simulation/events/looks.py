@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau.language.symbols import time
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.events.crossings import Crossing
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.phases import SHARE, moved, phases_along
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.time_grid import Trail
@@ -40,7 +40,7 @@ class Looks:
             return False
         return self._divide(here, np.full(min(max(count, AHEAD), self.trail.last - here), parts), least)
 
-    def by_margins(self, places: np.ndarray, gaps: Margins, found: Crossing | None) -> bool:
+    def by_margins(self, places: np.ndarray, gaps: SwitchMargins, found: Crossing | None) -> bool:
         """Lay places closer if gaps may turn more than once in an interval up to a crossing; whether they did."""
         trail = self.trail
         last = places.size - 1 if found is None else found.place + 1
@@ -79,7 +79,7 @@ def _phases_of(coordinates: Coordinates) -> AtPlaces | None:
     return phases_along(within, c.arguments, moving, along)
 
 
-def unforeseen(t: np.ndarray, gaps: Margins) -> np.ndarray:
+def unforeseen(t: np.ndarray, gaps: SwitchMargins) -> np.ndarray:
     """Intervals between times t (n,) in s, (n - 1,), across which gaps do not go as those beside them lead to expect."""
     found = np.zeros(t.size - 1, dtype=bool)
     h, g, rates = (t[2:] - t[:-2])[:, None], gaps.values, gaps.rates

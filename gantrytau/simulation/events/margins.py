@@ -20,25 +20,25 @@ ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it i
 
 
 @dataclass(frozen=True)
-class Margins:
+class SwitchMargins:
     """Margins at some places, each (places, switches): values, their rates in 1/s, and what rounding makes of zero."""
 
     values: np.ndarray
     rates: np.ndarray
     noise: np.ndarray
 
-    def blurred(self, errors: np.ndarray | float) -> "Margins":
+    def blurred(self, errors: np.ndarray | float) -> "SwitchMargins":
         """The same, known no better than by some errors."""
-        return Margins(self.values, self.rates, np.maximum(self.noise, errors))
+        return SwitchMargins(self.values, self.rates, np.maximum(self.noise, errors))
 
     @property
     def below(self) -> np.ndarray:
         """Whether each is below zero."""
         return self.values < -self.noise
 
-    def until(self, count: int) -> "Margins":
+    def until(self, count: int) -> "SwitchMargins":
         """The same at the first places."""
-        return Margins(self.values[:count], self.rates[:count], self.noise[:count])
+        return SwitchMargins(self.values[:count], self.rates[:count], self.noise[:count])
 
 
 class Switches:
@@ -79,7 +79,9 @@ class Switches:
     def __len__(self) -> int:
         return len(self.turns)
 
-    def look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray, size: np.ndarray) -> Margins:
+    def look(
+        self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray, size: np.ndarray
+    ) -> SwitchMargins:
         """The margins at places: x (places, n), z (places, m), t (places,), w (places, k); size: of states, (n,)."""
         places = len(t)
         found = self._look(x, z, t, t, w, size[None])
@@ -94,7 +96,7 @@ class Switches:
                 rates -= (by_z @ np.linalg.solve(inner, change))[:, :, 0]
         rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
-        return Margins(values, rates, noise)
+        return SwitchMargins(values, rates, noise)
 
     @cached_property
     def _rounding(self) -> ca.Function:
@@ -128,7 +130,7 @@ class Switches:
         """Where margins turn: at the nearest whole number, if they count, else at zero."""
         return np.where(self._counts, np.round(margins), 0.0)
 
-    def following(self, margins: Margins, before: np.ndarray | None = None) -> np.ndarray:
+    def following(self, margins: SwitchMargins, before: np.ndarray | None = None) -> np.ndarray:
         """The modes just after one place: where a margin is zero, its rate decides, or those `before` stay."""
         values, rates, noise = margins.values[0], margins.rates[0], margins.noise[0]
         whole = self.whole(values)
@@ -141,15 +143,15 @@ class Switches:
             )
         return np.where(turning, after, self.written(values))
 
-    def gaps(self, margins: Margins, modes: np.ndarray) -> Margins:
+    def gaps(self, margins: SwitchMargins, modes: np.ndarray) -> SwitchMargins:
         """How far from its next turn each switch is: below zero the modes do not hold; two columns for one that counts."""
         sign = np.where(self._counts, 1.0, 2 * modes - 1)
         first = sign * margins.values - np.where(self._counts, modes, 0.0)
         counts = self._counts
         if not counts.any():
-            return Margins(first, sign * margins.rates, margins.noise)
+            return SwitchMargins(first, sign * margins.rates, margins.noise)
         second = modes[..., counts] + 1 - margins.values[:, counts]
-        return Margins(
+        return SwitchMargins(
             np.hstack([first, second]),
             np.hstack([sign * margins.rates, -margins.rates[:, counts]]),
             np.hstack([margins.noise, margins.noise[:, counts]]),

@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.border.refusal import SolveError
 from gantrytau.simulation.events.crossings import first_crossing
-from gantrytau.simulation.events.margins import Margins
+from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.buffers import Passages, StepsTaken
 from gantrytau.simulation.sampling.runge_kutta import ORDER
@@ -197,10 +197,14 @@ class Sampler:
         before = self._gaps(found, found.before[:count, :n], told, 0.0)
         at = np.stack([told[:, 0], told[:, 0] + told[:, 1]], axis=1).ravel()  # before and behind each step
         pairs = ((getattr(gaps, name) for gaps in (before, behind)) for name in ("values", "rates", "noise"))
-        first = first_crossing(at, Margins(*(np.stack([*p], axis=1).reshape(2 * count, -1) for p in pairs)))
+        first = first_crossing(
+            at, SwitchMargins(*(np.stack([*p], axis=1).reshape(2 * count, -1) for p in pairs))
+        )
         return None if first is None else (first.place + 1) // 2
 
-    def _gaps(self, found: StepsTaken, x: np.ndarray, told: np.ndarray, later: np.ndarray | float) -> Margins:
+    def _gaps(
+        self, found: StepsTaken, x: np.ndarray, told: np.ndarray, later: np.ndarray | float
+    ) -> SwitchMargins:
         """Gaps of what does not follow what is held, at states x in steps, some time behind their begins, s."""
         c, switches = self.coordinates, self.coordinates.switches
         half, m = len(c.sampled), len(c.held)
@@ -210,4 +214,4 @@ class Sampler:
         z = c.settle(x, found.algebraics[: len(told)], at, w)
         gaps = switches.gaps(switches.look(x, z, at, w, self.sizes), own[:, m + len(c.discretes) :])
         chosen = np.concatenate([self._live, self._live[[turn.counts for turn in switches.turns]]])
-        return Margins(*(a[:, chosen] for a in (gaps.values, gaps.rates, gaps.noise)))
+        return SwitchMargins(*(a[:, chosen] for a in (gaps.values, gaps.rates, gaps.noise)))
