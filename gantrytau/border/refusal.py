@@ -4,10 +4,11 @@ import difflib
 import linecache
 import re
 import traceback
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Self
 
 HINTS = {
@@ -77,6 +78,21 @@ class GantryTauError(Exception):
         around = copy(self)
         around.place = f"{place}: {self.place}" if self.place else place
         return around
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython prints: the user's frames alone, of its causes as well; `raise` keeps all of them."""
+        from IPython.core.getipython import get_ipython
+
+        shell: Any = get_ipython()
+        whole = {error: error.__traceback__ for error in _chain(self)}
+        try:
+            for error, trace in whole.items():
+                error.__traceback__ = _of_users(trace)
+            trace, offset = self.__traceback__, shell.InteractiveTB.tb_offset
+            return shell.InteractiveTB.structured_traceback(type(self), self, trace, tb_offset=offset)
+        finally:
+            for error, trace in whole.items():
+                error.__traceback__ = trace
 
 
 class ModelError(GantryTauError):
@@ -181,6 +197,24 @@ def _index_in_words(error: BaseException) -> str:
         if "site-packages" not in frame.filename and written.endswith("]"):
             return f"`{written}` is {words}"
     return words
+
+
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """An error and what led to it, as Python tells them."""
+    while error is not None:
+        yield error
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+
+
+def _of_users(trace: TracebackType | None) -> TracebackType | None:
+    """A traceback without the frames of this toolkit."""
+    if trace is None:
+        return None
+    rest = _of_users(trace.tb_next)
+    package = str(trace.tb_frame.f_globals.get("__name__")).split(".")[0]
+    if package.startswith("gantrytau"):
+        return rest
+    return TracebackType(rest, trace.tb_frame, trace.tb_lasti, trace.tb_lineno)
 
 
 def user_lines(error: BaseException | None, source: Path | None) -> list[str]:

@@ -24,11 +24,11 @@ from gantrytau.commands.printing.reporting import (
     INTERRUPTED,
     MISUSE,
     answered,
+    busy,
     fail,
     note,
     reporting,
 )
-from gantrytau.commands.printing.solver_line import live
 from gantrytau.commands.printing.spelling import spelled
 from gantrytau_optimica import Optimum
 
@@ -68,8 +68,8 @@ def optimize(
         check_display(units, flat, drawn)
         model: Any = chosen.model
         try:
-            with live(chosen.name, quiet) as progress:
-                optimum = gantrytau_optimica.optimize(model, guess=start, progress=progress, **policy)
+            with busy(chosen.name, quiet):
+                optimum = gantrytau_optimica.optimize(model, guess=start, **policy)
         except SolveError as error:
             _leave(error, chosen, save, json)
         _answer(optimum, chosen, flat, Wanted(save, drawn, place, json, units))

@@ -19,12 +19,12 @@ from gantrytau.commands.printing.reporting import (
     FAULT,
     CommandError,
     answered,
+    busy,
     note,
     reporting,
     writable_place,
     written,
 )
-from gantrytau.commands.printing.solver_line import live
 from gantrytau_optimica import TradeOff
 from gantrytau_optimica import optimize as solved_once
 from gantrytau_optimica import pareto as solved
@@ -74,8 +74,8 @@ def pareto(
         chosen = build(problem, prototype, set_ or (), PROBLEM)
         model: Any = chosen.model
         check_names("--weight", [weight], flatten(model).expand)
-        with live(chosen.name, quiet) as progress:
-            found = solved(model, weight, numbers, along=quantities or None, progress=progress, **policy)
+        with busy(chosen.name, quiet):
+            found = solved(model, weight, numbers, along=quantities or None, **policy)
         files = [*written(output, found.save), *picture_output.shown(found.plot, plot)]
         answered(json, _summary(chosen.name, found), found.report(), files)
         if found.failures:

@@ -1,1 +1,5 @@
-"""What things say of themselves: short words for values and records, descriptions as text and HTML, pages."""
+"""What things say of themselves: short words for values and records, descriptions as text and HTML, pages, progress."""
+
+from gantrytau.progress import Progress
+
+__all__ = ["Progress"]

@@ -80,7 +80,7 @@ def _finished(
     found = {outcome.number: outcome for outcome in kept or () if outcome.number < len(cases)}
     left = [case for case in cases if case.number not in found]
     try:
-        with Progress(0, len(cases), f"{title}: {len(cases)} cases") as progress:
+        with Progress(f"{title}: {len(cases)} cases", 0.0, len(cases)) as progress:
             progress.at(len(found))
             for outcome in outcomes(task, left, place, safe=isinstance(task, ModelTask)):
                 found[outcome.number] = outcome

@@ -19,6 +19,13 @@ class _Part:
     """What a class body may hold besides quantities and arrays."""
 
 
+INNER = {
+    "chosen_starts",
+    "drawn",
+    "members",
+    "open",
+    "shapes",
+}  # names that are not offered behind a component
 _PARTS = (Quantity, _Part)
 
 
@@ -76,6 +83,9 @@ class Declared(_Part):
         """As it is made: `Cart(m=2.0, s=Start(0.5))`."""
         given = (f"{name}={_written(value)}" for name, value in vars(self).get("_modifications", {}).items())
         return f"{type(self).__name__}({joined(given, WHOLE)})"
+
+    def __dir__(self) -> list[str]:
+        return [name for name in super().__dir__() if name not in INNER]
 
     def _repr_html_(self) -> str:
         return self.__describe__().html()

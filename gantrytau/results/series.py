@@ -169,6 +169,9 @@ class Series:
             self._known[name] = values
         return self._known[name]
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return ["time", *self._names, *self._arrays]
+
     def final(self, name: str) -> Any:
         """The last value: a float, or an array for a vector or matrix."""
         last = self[name][-1]

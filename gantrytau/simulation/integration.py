@@ -100,7 +100,10 @@ class Run:
         self.done = self.changes.begin()
         if self.history:
             self.history.begin()
-        with Progress(trail.t[0], trail.t[-1]) as progress, on_interrupt(self.integrators.interrupt):
+        with (
+            Progress("simulate", trail.t[0], trail.t[-1]) as progress,
+            on_interrupt(self.integrators.interrupt),
+        ):
             size = most = self._longest()
             while self.done < trail.last and not self.changes.ended:
                 progress.at(trail.t[self.done])

@@ -11,6 +11,7 @@ from gantrytau.border.checks import instance, number
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.dae import Dae, translate
 from gantrytau.language.model import Model
+from gantrytau.progress import shows_progress
 from gantrytau.results.result import Result
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def view(
     return _page([film_of(pose_only, model=dae, around=around)], [""], dae.name, file)
 
 
+@shows_progress
 def animate(
     shown: Any,
     *,

@@ -9,6 +9,7 @@ from typing import Any, Literal, Unpack
 from gantrytau import SolveError
 from gantrytau.compiler.request import names
 from gantrytau.compiler.system import Causality
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.answers.archive.run_record import require_place, write_record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
@@ -32,6 +33,7 @@ from gantrytau_optimica.transcription.transcribe import Scheme, transcribe
 Problem = Optimization | type[Optimization] | SymbolicProblem
 
 
+@shows_progress
 def optimize(
     problem: Problem,
     *,

@@ -3,7 +3,7 @@
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -152,13 +152,12 @@ def _run(
 
 def _advance(running: RunningSystem, master: Master, recorder: Recorder) -> None:
     grid = running.grid
-    with nullcontext() if master.progress else Progress(grid.begin, grid.stop) as bar:
-        tell = master.progress or (bar.at if bar else None)
+    with Progress("cosimulate", grid.begin, grid.stop, wanted=master.progress is None) as bar:
+        tell = master.progress or bar.at
         for k in range(grid.count):
             running.advance(k, master)
             recorder.add(running)
-            if tell:
-                tell(grid.time(k + 1))
+            tell(grid.time(k + 1))
 
 
 @contextmanager

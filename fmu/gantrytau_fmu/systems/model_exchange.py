@@ -37,7 +37,7 @@ def integrate(component: Component, system: ConnectedSystem, grid: Grid, toleran
     log: list[str] = []
     reached: list[Any] = []  # FMPy's recorder, once there is one
     simulate: Callable[..., Any] = fmpy.simulate_fmu
-    with Progress(grid.begin, grid.stop) as bar, on_interrupt(lambda: pressed.append(True)):
+    with Progress("cosimulate", grid.begin, grid.stop) as bar, on_interrupt(lambda: pressed.append(True)):
 
         def go_on(time: float, recorder: Any) -> bool:
             reached[:] = [recorder]

@@ -17,12 +17,12 @@ from gantrytau.commands.printing import picture_output
 from gantrytau.commands.printing.reporting import (
     INTERRUPTED,
     answered,
+    busy,
     fail,
     reporting,
     writable_place,
     write_text,
 )
-from gantrytau.commands.printing.solver_line import live
 from gantrytau_optimica import Estimate
 
 MOST = 10  # parameters whose covariance is printed; --json has all
@@ -67,12 +67,11 @@ def estimate(
         asked = read_estimate(file)
     with reporting(json, source_of(asked.text), NAMES):
         try:
-            with live(asked.chosen.name, quiet or json) as progress:
+            with busy(asked.chosen.name, quiet or json):
                 found = gantrytau_optimica.estimate(
                     asked.chosen.model,
                     asked.parameters,
                     asked.experiments,
-                    progress=progress,
                     **asked.keywords,
                 )
         except SolveError as error:

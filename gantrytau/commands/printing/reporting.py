@@ -1,7 +1,6 @@
 """How commands speak: results and errors as sentences or as JSON, exit codes, lines of the user's own file."""
 
 import math
-import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import typer
 from gantrytau import GantryTauError
 from gantrytau.border import NotLoaded, python_error, user_lines
 from gantrytau.commands.printing.spelling import RUNNING, spelled, worded
+from gantrytau.describing import Progress
 
 FAULT = 1  # exit code: the model has a fault, or its simulation stopped
 MISUSE = 2  # exit code: the command was called wrongly, or a file cannot be read or written
@@ -132,13 +132,9 @@ def print_table(headings: Sequence[str], rows: Iterable[Sequence[str]], right: S
     Console().print(table)
 
 
-@contextmanager
-def busy(words: str) -> Iterator[None]:
-    """A turning sign on the terminal while something takes its time."""
-    from rich.console import Console
-
-    with Console(file=sys.stderr).status(words):
-        yield
+def busy(words: str, quiet: bool = False) -> Progress:
+    """A line on the terminal while something takes its time, none if quiet."""
+    return Progress(words, wanted=not quiet)
 
 
 def write_text(text: str, file: Path) -> None:

@@ -17,6 +17,7 @@ from gantrytau.kinematics.workspace.grid_spacing import checked_places, settled_
 from gantrytau.kinematics.workspace.model_limits import ModelExaminer
 from gantrytau.kinematics.workspace.pose_limits import Examiner, Limits
 from gantrytau.language.model import Model
+from gantrytau.progress import shows_progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,6 +60,7 @@ class Workspace(Cells):
         return draw_solid(self, file)
 
 
+@shows_progress
 def workspace(
     robot: Model | Kinematics,
     limits: Limits | None = None,

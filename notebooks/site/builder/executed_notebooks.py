@@ -38,7 +38,7 @@ def _execute(path: Path, target: Path) -> None:
 
     begin = time.monotonic()
     notebook = jupytext.read(path)
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"}
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore", "GANTRYTAU_PROGRESS": "0"}
     environment["PYTHONPATH"] = os.pathsep.join([*_sources(), os.environ.get("PYTHONPATH", "")])
     quiet = ["--log-level=ERROR"]
     client: Any = nbclient.NotebookClient(

@@ -176,6 +176,12 @@ class Answer(Record, ABC):
         result = self.by_phase[self.path_of(self._elements(name)[0])]
         return result[name] if name in result else self.signal(name)(result.time)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [
+            *self.free,
+            *(n for result in self.by_phase.values() for n in result._ipython_key_completions_()),
+        ]
+
     def final(self, name: str) -> Any:
         """The value at the end of the horizon; of a free number its value."""
         chosen = self._chosen(name)

@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau import Model, ModelError
 from gantrytau.border.checks import check_words, instance
 from gantrytau.border.refusal import Given
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.calibration.calibration import Calibration
 from gantrytau_optimica.calibration.data.measurements import Measurements
 from gantrytau_optimica.calibration.diagnostics.acceptance import (
@@ -81,6 +82,7 @@ def calibrate(
 ) -> NamedCalibration: ...
 
 
+@shows_progress
 def calibrate(
     robot: Model,
     measurements: Measurements,

@@ -19,6 +19,7 @@ from gantrytau import Model, ModelError, SolveError
 from gantrytau.border.checks import check_words, instance
 from gantrytau.border.refusal import Given
 from gantrytau.language.symbols import split_derivative
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
@@ -54,6 +55,7 @@ MOST_CORNERS = 2000  # where a mesh that misses some does not lead to the data
 AT_FIRST = 50  # elements or a few more, on which a first answer is looked for from far away
 
 
+@shows_progress
 def estimate(
     model: Model | type[Model],
     parameters: Mapping[str, Any],

@@ -12,6 +12,7 @@ from gantrytau.border.checks import array, instance, whole
 from gantrytau.ensembles.parallel_map import each
 from gantrytau.kinematics import Limits, workspace
 from gantrytau.kinematics.workspace.grid_spacing import checked_places
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.calibration.data.data_checks import FEWEST
 from gantrytau_optimica.calibration.devices.devices import Device
 from gantrytau_optimica.procedure.calibration_plan import CalibrationPlan
@@ -38,6 +39,7 @@ from gantrytau_optimica.procedure.stages import Progress, Stages, digest
 from gantrytau_optimica.procedure.workspace_resolution import SettledWorkspace, settled_workspace
 
 
+@shows_progress
 def plan_calibration(
     robot: Model,
     limits: Limits,

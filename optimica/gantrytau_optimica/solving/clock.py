@@ -5,6 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from gantrytau.progress import Progress as Line
+
 # called with (iteration, objective), and `stage=` where it has a parameter of that name: what is at work, in words
 Progress = Callable[..., Any]
 
@@ -16,6 +18,7 @@ class Clock:
         self.begun = time.perf_counter()
         self.end = self.begun + max_time
         self.progress, self.stage = progress, ""
+        self.line = Line.shown() if progress is None else None  # on the screen
         self.last = (0, float("nan"))
         self._staged = progress is not None and "stage" in _parameters(progress)
 
@@ -32,12 +35,17 @@ class Clock:
     def enter(self, stage: str) -> None:
         """What comes next, as "round 2 of at most 13: solving"."""
         self.stage = stage
+        if self.line is not None:
+            self.line.stage = stage
         if self._staged and self.progress is not None:
             self.progress(*self.last, stage=stage)
 
     def tell(self, iteration: int, objective: float) -> None:
         """An iteration of the solver."""
         self.last = (iteration, objective)
+        if self.line is not None:
+            words = f"iteration {iteration}, objective {objective:.6g}"
+            self.line.stage = f"{self.stage}, {words}" if self.stage else words
         if self._staged and self.progress is not None:
             self.progress(iteration, objective, stage=self.stage)
         elif self.progress is not None:

@@ -70,7 +70,9 @@ class Watch(ca.Callback):
             ca.nlpsol_out(i): np.zeros(0) if one is None else np.frombuffer(one).copy()
             for i, one in enumerate(arg)
         }
-        if self.clock is not None and self.clock.progress is not None and not self.left:
+        if self.clock is not None and self.clock.progress is None:
+            self.clock.tell(self.iteration, float(self.last["f"].item()))
+        elif self.clock is not None and not self.left:
             self.told.put((self.iteration, self.last["f"].item()))
             self.heard.get()
         late = self.clock is not None and not self.clock.left

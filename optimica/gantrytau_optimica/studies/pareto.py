@@ -8,6 +8,7 @@ import numpy as np
 from gantrytau import ModelError, SolveError
 from gantrytau.border.checks import array
 from gantrytau.border.refusal import USERS_ERRORS, Given, did_you_mean
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.optimize import Problem, prepare_with
 from gantrytau_optimica.policy import TranscriptionKeywords, policy_of
@@ -19,6 +20,7 @@ Quantity = Callable[[Optimum], float]
 EQUAL = 1e-6  # relative: quantities that differ by less are the same, a hundred times Ipopt's tolerance
 
 
+@shows_progress
 def pareto(
     problem: Problem,
     weight: str,

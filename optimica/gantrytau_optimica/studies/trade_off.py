@@ -47,6 +47,9 @@ class TradeOff(Record):
             raise ModelError(f"{self.name}: the points have no '{name}'{did_you_mean(name, found)}")
         return found[name]
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [self.weight, *self.quantities]
+
     @property
     def iterations(self) -> int:
         """Iterations of the solver for the points as they stand."""

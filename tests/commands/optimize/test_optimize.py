@@ -2,7 +2,6 @@
 
 import csv
 import inspect
-import io
 import json
 import signal
 import sys
@@ -262,26 +261,6 @@ def test_what_cannot_be_saved_does_not_hide_why_it_stopped(unsolved, move, tmp_p
     assert "iteration limit reached" in report["error"]
     assert "What was reached cannot be saved: " in report["error"]
     assert "is a folder" in report["error"]
-
-
-class Terminal(io.StringIO):
-    """Somebody watches."""
-
-    def isatty(self):
-        return True
-
-
-@pytest.mark.parametrize("quiet", [False, True])
-def test_a_line_of_the_terminal_follows_the_solver(answer, move, monkeypatch, quiet):
-    from gantrytau.commands.printing.solver_line import live
-
-    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    monkeypatch.setenv("TERM", "xterm")
-    with live("Fastest", quiet) as progress:
-        assert (progress is None) == quiet
-        if progress:
-            progress(7, 1.25)
-    assert ("Fastest: iteration 7, objective 1.25, 0.0 s" in terminal.getvalue()) != quiet
 
 
 def test_nothing_but_the_user_speaks_on_stderr_without_a_terminal(run, move):

@@ -99,6 +99,9 @@ class Playback(Record):
         """A variable along the motion as played, over `result.time`."""
         return self.result[name]
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.result._ipython_key_completions_()
+
     def lines(self) -> list[str]:
         """The verdict in sentences."""
         if not self.complete:

@@ -42,6 +42,9 @@ class Named(Mapping[str, Any]):
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self._values)
+
     def __len__(self) -> int:
         return len(self._values)
 

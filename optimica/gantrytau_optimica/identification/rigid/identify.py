@@ -9,6 +9,7 @@ import numpy as np
 from gantrytau import Model, translate
 from gantrytau.border.checks import check_words, number
 from gantrytau.dae import Dae
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.fitting.diagnostics import diagnose
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.least_squares.parameter_limits import ParameterLimits
@@ -47,6 +48,7 @@ SIGNS = ("not white", "outliers")  # told where no cause is
 INFLATED = 10.0  # times the deviation of a parameter alone: errors of the model weigh as much more
 
 
+@shows_progress
 def identify(
     robot: Model | Dae,
     log: MotionLog | Sequence[MotionLog],

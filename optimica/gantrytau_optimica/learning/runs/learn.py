@@ -13,6 +13,7 @@ import numpy as np
 from gantrytau import GantryTauError, ModelError, Result
 from gantrytau.border.checks import whole
 from gantrytau.border.refusal import USERS_ERRORS, Given
+from gantrytau.progress import shows_progress, tell
 from gantrytau_optimica.learning.estimators.estimator import Estimator, at_rest
 from gantrytau_optimica.learning.estimators.estimators import Actuators
 from gantrytau_optimica.learning.laws.learning import Learning, Stability
@@ -41,6 +42,7 @@ class LearningError(GantryTauError):
         self.history = history
 
 
+@shows_progress
 def learn(
     rig: Plant,
     reference: Reference,
@@ -86,6 +88,7 @@ def learn(
         )
     found = replace(found, stability=stability)
     for k in range(len(found), iterations + 1):
+        tell(f"run {k} of {iterations}")
         found = _next_run(rig, found, learning, estimator, corrections, RUNS * seed + k)
         if path is not None:
             found.save(path)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau.border.checks import check_words
+from gantrytau.progress import shows_progress
 from gantrytau_optimica.fitting.blocks import BlockRows
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.vision.detection.detections import Detections
@@ -42,6 +43,7 @@ from gantrytau_optimica.vision.reconstruction.stray_images import (
 Array = np.ndarray
 
 
+@shows_progress
 def reconstruct(
     detections: Detections,
     cameras: Sequence[Camera],
