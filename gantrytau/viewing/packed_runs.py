@@ -56,11 +56,12 @@ def packed(
     names: Sequence[str] = (),
     first: Sequence[str] = (),
     display: Display = None,
+    scene: dict[str, Any] | None = None,
 ) -> list[str]:
     """Texts in base64: what is said of runs and variables first, as JSON, then the blocks of numbers that it counts.
 
-    names: variables and components, none for all; first: those that are drawn at first; display: units as of `Result.plot`.
-    ModelError for unknown names, and for more numbers than a page can hold.
+    names: variables and components, none for all; first: those that are drawn at first; display: units as of `Result.plot`;
+    scene: what is told of the model beside. ModelError for unknown names, and for more numbers than a page can hold.
     """
     begun = list(dict.fromkeys(name for found in _chosen(runs, first, "first") for name in found))
     chosen = _chosen(runs, [*names, *begun] if names else [""], "names")
@@ -83,7 +84,13 @@ def packed(
         records.append(record)
         for signals in _together(columns.signals, run.time.size):
             record["columns"] += _coded(signals, bits, blocks)
-    told = {"runs": records, "first": begun, "variables": list(variables.values()), "bits": bits}
+    told = {
+        "runs": records,
+        "scene": scene,
+        "first": begun,
+        "variables": list(variables.values()),
+        "bits": bits,
+    }
     head = json.dumps(told, allow_nan=False, separators=(",", ":")).encode()
     return [_text(block) for block in (head, *blocks)]
 

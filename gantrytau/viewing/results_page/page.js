@@ -40,7 +40,7 @@
 
   const said = (name, time) => (time === null ? "" : `${name} = ${short(time)} s`);
   Panels.onChange = (time) => {
-    const {a, b} = Panels, parts = [said("t", time), said("A", a), said("B", b)];
+    const {a, b} = Panels, parts = [time === a ? "" : said("t", time), said("A", a), said("B", b)];
     if (a !== null && b !== null) parts.push(`B − A = ${short(b - a)} s`, b === a ? "" : `1/(B − A) = ${short(1 / (b - a))} Hz`);
     $("status").textContent = parts.filter(Boolean).join("   ");
   };
@@ -67,7 +67,7 @@
     event.preventDefault();
   });
 
-  $("accuracy").textContent = `values to ${short(2 ** -Data.bits)} of their range`;
+  $("accuracy").textContent = `values to ${Number((2 ** -Data.bits).toPrecision(1))} of their range`;
   for (const run of Data.runs) if (run.ended !== "stop") $("accuracy").textContent += ` · ${run.title} ended: ${run.ended}`;
   runs();
   Panels.start($("panels"), $("bands"));
