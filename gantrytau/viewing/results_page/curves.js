@@ -17,10 +17,9 @@ const Curves = (() => {
   self.range = (curves, low, high) => {
     let least = Infinity, most = -Infinity;
     for (const curve of curves) {
-      const {x, y, ordered} = curve, t = x;
-      const first = ordered ? Data.before(t, low) : 0;
+      const {x, y, ordered} = curve, first = ordered ? Data.before(x, low) : 0;
       for (let n = first; n < y.length; n++) {
-        if (ordered && t[n] > high && n > first + 1) break;
+        if (ordered && x[n] > high && n > first + 1) break;
         if (y[n] < least) least = y[n];
         if (y[n] > most) most = y[n];
       }
@@ -37,7 +36,7 @@ const Curves = (() => {
 
   // x over (low, high) goes to pixels X(x), y to Y(y); sink: moveTo and lineTo
   self.trace = (curve, low, high, X, Y, sink) => {
-    const {x, y, ordered} = curve, held = ordered && steps(curve);
+    const {t, x, y, ordered} = curve, held = ordered && steps(curve);
     const first = ordered ? Data.before(x, low) : 0;
     const last = ordered ? Math.min(Data.before(x, high) + 1, x.length - 1) : x.length - 1;
     const dense = ordered && last - first > 4 * Math.abs(X(high) - X(low));
@@ -56,7 +55,8 @@ const Curves = (() => {
         continue;
       }
       const px = X(x[n]), py = Y(y[n]);
-      if (!down) sink.moveTo(px, py);
+      const apart = !ordered && n > first && t[n] === t[n - 1]; // nothing lies between both sides of a jump
+      if (!down || apart) sink.moveTo(px, py);
       else if (!dense) {
         if (held) sink.lineTo(px, before);
         sink.lineTo(px, py);

@@ -39,6 +39,19 @@ const Data = (() => {
     self.variables.forEach((variable, k) => (variable.id = k));
   })();
 
+  // the shortest decimal number that is nearer to a value than the page knows it
+  self.rounded = (value, variable, k) => {
+    const held = variable.runs[k];
+    if (!Number.isFinite(value)) return "nan";
+    if (!Array.isArray(held)) return value;
+    const near = Math.abs((variable.scale || [1])[0]) * 0.51 * self.runs[k].columns[held[0]][5];
+    for (let digits = 1; digits < 17; digits++) {
+      const found = Number(value.toPrecision(digits));
+      if (Math.abs(found - value) <= near) return found;
+    }
+    return value;
+  };
+
   self.isConstant = (variable) => variable.runs.every((held) => !Array.isArray(held));
 
   // the values of a variable in a run as they are shown, (times,); null where the run does not have it

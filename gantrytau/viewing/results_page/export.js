@@ -29,7 +29,7 @@ const Export = (() => {
       const rows = [...run.t.keys()].filter((n) => run.t[n] >= low && run.t[n] <= high);
       columns.push([heading("time", "s", run), rows.map((n) => run.t[n])]);
       for (const {variable, y} of chosen.values())
-        columns.push([heading(variable.name, variable.unit, run), rows.map((n) => (Number.isFinite(y[n]) ? Number(y[n].toPrecision(10)) : "nan"))]);
+        columns.push([heading(variable.name, variable.unit, run), rows.map((n) => Data.rounded(y[n], variable, k))]);
     });
     const longest = Math.max(0, ...columns.map(([, values]) => values.length));
     const lines = [columns.map(([name]) => name).join(",")];
@@ -60,7 +60,9 @@ const Export = (() => {
     const X = (v) => LEFT + ((v - x[0]) / (x[1] - x[0])) * width, Y = (v) => top + height - ((v - y[0]) / (y[1] - y[0])) * height;
     for (const v of Curves.ticks(...x, width / 90)) parts.push(line(X(v), top, X(v), top + height, 'stroke="#ddd"'), text(X(v), top + height + 15, short(v), 'text-anchor="middle"'));
     for (const v of Curves.ticks(...y, height / 35)) parts.push(line(LEFT, Y(v), LEFT + width, Y(v), 'stroke="#ddd"'), text(LEFT - 6, Y(v) + 4, short(v), 'text-anchor="end"'));
-    const id = `clip${parts.length}`;
+    const id = `clip${parts.length}`, shade = Panels.shading(one);
+    for (const [begin, end, value] of shade ? Curves.stretches(shade, ...x) : [])
+      if (value) parts.push(`<rect x="${X(Math.max(begin, x[0]))}" y="${top}" width="${X(Math.min(end, x[1])) - X(Math.max(begin, x[0]))}" height="${height}" fill="${Curves.colour(Math.abs(value) + 1, true)}" fill-opacity="0.13"/>`);
     parts.push(`<clipPath id="${id}"><rect x="${LEFT}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#${id})">`);
     for (const curve of shown) parts.push(path(curve, x, X, Y));
     parts.push(`</g><rect x="${LEFT}" y="${top}" width="${width}" height="${height}" fill="none" stroke="#888"/>`);

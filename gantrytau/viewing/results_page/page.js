@@ -70,12 +70,12 @@
   $("accuracy").textContent = `values to ${Number((2 ** -Data.bits).toPrecision(1))} of their range`;
   for (const run of Data.runs) if (run.ended !== "stop") $("accuracy").textContent += ` · ${run.title} ended: ${run.ended}`;
   runs();
+  Scene.start($("scene"), $("show-scene"));
   Panels.start($("panels"), $("bands"));
   Tree.start($("tree"), $("search"));
   Panels.layout();
   for (const variable of first()) await Panels.toggle(variable);
   Panels.active = Panels.panels[0] || null;
   Panels.layout();
-  Scene.start($("scene"), $("show-scene"));
   document.body.dataset.ready = "yes";
 })();

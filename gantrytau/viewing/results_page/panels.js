@@ -23,12 +23,12 @@ const Panels = (() => {
     return found;
   }
 
-  // colours by variable and dashes by run, or colours by run where there is one variable
+  // colours by variable, or by run where there is one variable; dashes by run
   function colours(panel) {
     const several = panel.variables.length > 1;
     for (const curve of panel.curves) {
       curve.hue = several ? panel.hues.get(curve.variable.id) : curve.run;
-      curve.dash = several ? Curves.dash(curve.run) : [];
+      curve.dash = Curves.dash(curve.run);
     }
   }
 
@@ -180,9 +180,12 @@ const Panels = (() => {
     ctx.fill();
   }
 
+  // the curve of the mode that shades a panel
+  self.shading = (panel) =>
+    panel.x ? null : self.bands.find((one) => one.shade)?.curves.find((one) => Data.runs[one.run].shown);
+
   function shade(panel, u) {
-    const band = !panel.x && self.bands.find((one) => one.shade);
-    const curve = band && band.curves.find((one) => Data.runs[one.run].shown);
+    const curve = self.shading(panel);
     if (!curve) return;
     const {ctx} = u, {left, top, width, height} = u.bbox, [low, high] = self.times();
     ctx.save();
@@ -293,9 +296,14 @@ const Panels = (() => {
       for (const curve of panel.curves) if (curve.reading) curve.reading.textContent = reading(curve, time);
     }
     for (const band of self.bands) for (const curve of band.curves)
-      if (curve.reading) curve.reading.textContent = time === null ? "" : `= ${Curves.word(band.variable, Data.at(curve, time)?.[1] ?? "–")}`;
+      if (curve.reading) curve.reading.textContent = time === null ? "" : word(band, curve, time);
     self.onChange(time);
   };
+
+  function word({variable}, curve, time) {
+    const sides = (Data.at(curve, time) || []).map((one) => Curves.word(variable, one));
+    return sides.length ? `= ${[...new Set(sides)].join(" → ")}` : "";
+  }
 
   function reading(curve, time) {
     const now = time === null ? null : Data.at(curve, time);
