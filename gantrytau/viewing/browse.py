@@ -49,6 +49,11 @@ def browse(
             "browse: found nothing, expected results of simulate or optimize, browse(result, other)"
         )
     runs = [series_of("browse", one) for one in results]
+    for run in runs:
+        if not run.names:
+            raise ModelError(
+                f"browse: found no variables in {run.title or 'a result'}, expected some; simulate with outputs="
+            )
     named = _titles(titles, [run.title or "run" for run in runs])
     kept, begun = (_names(argument, chosen) for argument, chosen in (("names", names), ("first", first)))
     title = ", ".join(dict.fromkeys(run.title for run in runs if run.title)) or "Results"

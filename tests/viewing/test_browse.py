@@ -27,8 +27,12 @@ def run(**more):
 
 
 def unpacked(page):
-    """What the page is told, and the values of a variable in a run as it computes them, (times,)."""
-    found = re.search(r'<script type="text/plain" id="data">\n(.*?)\n</script>', page.text, re.DOTALL)
+    return unpacked_text(page.text)
+
+
+def unpacked_text(text):
+    """What a page is told, and the values of a variable in a run as it computes them, (times,)."""
+    found = re.search(r'<script type="text/plain" id="data">\n(.*?)\n</script>', text, re.DOTALL)
     assert found
     head, *blocks = [zlib.decompress(base64.b64decode(line)) for line in found[1].split("\n")]
     told = json.loads(head)
@@ -123,6 +127,8 @@ def test_what_is_no_result_or_too_large_is_told():
         browse()
     with pytest.raises(ModelError, match="browse: found dict, expected what simulate"):
         browse({"x": [1.0]})
+    with pytest.raises(ModelError, match="found no variables in run"):
+        browse(Result([0.0, 1.0], {}, title="run"))
     times = np.linspace(0, 1, 60_000)
     large = Result(times, {f"x{k}": times for k in range(1000)})
     with pytest.raises(ModelError, match=r"480 MB.*at most 400 MB.*names="):
