@@ -191,8 +191,9 @@ def _together(signals: Sequence[np.ndarray], size: int) -> Iterator[np.ndarray]:
 def _coded(signals: np.ndarray, bits: int, blocks: list[bytes]) -> list[list[float]]:
     """Signals (k, times) as a further block; of each [block, row, rows, order, least, step]: value = (integer + least) step.
 
-    Integers of `bits` bits of the range of a signal are stored as their differences of the order that makes them smallest,
-    the sign in the lowest bit, first the lowest bytes of all. A step is a power of two: zero and whole numbers stay exact.
+    Integers have `bits` bits of the range of a signal. Stored are their differences of the order that makes these smallest,
+    the sign in the lowest bit: the lowest bytes of all, then as many higher ones as there are. A step is a power of two, so
+    that zero and whole numbers stay exact.
     """
     finite = np.isfinite(signals)
     known = np.where(finite, signals, np.nan)
@@ -211,7 +212,8 @@ def _coded(signals: np.ndarray, bits: int, blocks: list[bytes]) -> list[list[flo
         best = np.where(better[:, None], differences, best)
         differences = np.diff(differences, axis=1, prepend=np.int32(0))
     signless = ((best << 1) ^ (best >> 31)).view(np.uint32)
-    planes = signless.astype("<u4").view(np.uint8).reshape(*signless.shape, 4).transpose(2, 0, 1)
+    count = max(1, (int(signless.max()).bit_length() + 7) // 8)
+    planes = signless.astype("<u4").view(np.uint8).reshape(*signless.shape, 4)[..., :count].transpose(2, 0, 1)
     block = len(blocks)
     blocks.append(planes.tobytes())
     return [

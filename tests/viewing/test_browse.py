@@ -43,8 +43,12 @@ def unpacked_text(text):
         if not isinstance(reference, list):
             return reference
         block, row, rows, order, least, step = told["runs"][k]["columns"][reference[0]]
-        planes = np.frombuffer(blocks[block], np.uint8).reshape(4, rows, -1)[:, row].astype(np.int64)
-        stored = (planes * 256 ** np.arange(4)[:, None]).sum(axis=0)
+        planes = (
+            np.frombuffer(blocks[block], np.uint8)
+            .reshape(-1, rows, told["runs"][k]["size"])[:, row]
+            .astype(np.int64)
+        )
+        stored = (planes * 256 ** np.arange(len(planes))[:, None]).sum(axis=0)
         integers = (stored >> 1) ^ -(stored & 1)
         for _ in range(order):
             integers = np.cumsum(integers)

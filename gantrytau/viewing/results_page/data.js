@@ -18,10 +18,9 @@ const Data = (() => {
   // integers of a row are sums of differences of an order, the lowest bit of which is the sign
   function integers(buffer, row, rows, order, size) {
     const planes = new Uint8Array(buffer), plane = rows * size, found = new Int32Array(size);
-    for (let n = 0, at = row * size; n < size; n++, at++) {
-      const z = planes[at] | (planes[at + plane] << 8) | (planes[at + 2 * plane] << 16) | (planes[at + 3 * plane] << 24);
-      found[n] = (z >>> 1) ^ -(z & 1);
-    }
+    for (let from = row * size, shift = 0; from < planes.length; from += plane, shift += 8)
+      for (let n = 0; n < size; n++) found[n] |= planes[from + n] << shift;
+    for (let n = 0; n < size; n++) found[n] = (found[n] >>> 1) ^ -(found[n] & 1);
     for (; order > 0; order--) for (let n = 1; n < size; n++) found[n] = (found[n] + found[n - 1]) | 0;
     return found;
   }
