@@ -38,7 +38,8 @@ class DistinctSignals:
         finite = np.isfinite(values)
         if not finite.any():
             return None
-        total = float(values[finite].sum())
+        with np.errstate(over="ignore"):
+            total = float(values[finite].sum())
         sign = -1 if total < 0 else 1
         same = self.known.setdefault(abs(total), [])
         for column in same:
@@ -174,7 +175,8 @@ def _as_bands(run: Series, name: str, said: dict[str, Any]) -> None:
 
 
 def _boolean(values: np.ndarray) -> bool:
-    return bool(((values == 0) | (values == 1)).all())
+    """Whether there is nothing but 0 and 1, and more than a ramp has."""
+    return values.size > 2 and bool(((values == 0) | (values == 1)).all())
 
 
 def _whole(values: np.ndarray) -> bool:

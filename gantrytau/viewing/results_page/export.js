@@ -58,8 +58,8 @@ const Export = (() => {
     });
     top += ROW * shown.length + 4;
     const X = (v) => LEFT + ((v - x[0]) / (x[1] - x[0])) * width, Y = (v) => top + height - ((v - y[0]) / (y[1] - y[0])) * height;
-    for (const v of Curves.ticks(...x, width / 90)) parts.push(line(X(v), top, X(v), top + height, 'stroke="#ddd"'), text(X(v), top + height + 15, short(v), 'text-anchor="middle"'));
-    for (const v of Curves.ticks(...y, height / 35)) parts.push(line(LEFT, Y(v), LEFT + width, Y(v), 'stroke="#ddd"'), text(LEFT - 6, Y(v) + 4, short(v), 'text-anchor="end"'));
+    for (const v of Curves.ticks(...x, width / 90)) parts.push(line(X(v), top, X(v), top + height, 'stroke="#ddd"'), text(X(v), top + height + 15, short(v, x), 'text-anchor="middle"'));
+    for (const v of Curves.ticks(...y, height / 35)) parts.push(line(LEFT, Y(v), LEFT + width, Y(v), 'stroke="#ddd"'), text(LEFT - 6, Y(v) + 4, short(v, y), 'text-anchor="end"'));
     const id = `clip${parts.length}`, shade = Panels.shading(one);
     for (const [begin, end, value] of shade ? Curves.stretches(shade, ...x) : [])
       if (value) parts.push(`<rect x="${X(Math.max(begin, x[0]))}" y="${top}" width="${X(Math.min(end, x[1])) - X(Math.max(begin, x[0]))}" height="${height}" fill="${Curves.colour(Math.abs(value) + 1, true)}" fill-opacity="0.13"/>`);

@@ -38,7 +38,7 @@
     return sorted.slice(0, 3);
   }
 
-  const said = (name, time) => (time === null ? "" : `${name} = ${short(time)} s`);
+  const said = (name, time) => (time === null ? "" : `${name} = ${short(time, Panels.times())} s`);
   Panels.onChange = (time) => {
     const {a, b} = Panels, parts = [time === a ? "" : said("t", time), said("A", a), said("B", b)];
     if (a !== null && b !== null) parts.push(`B − A = ${short(b - a)} s`, b === a ? "" : `1/(B − A) = ${short(1 / (b - a))} Hz`);

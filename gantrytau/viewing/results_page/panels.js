@@ -202,11 +202,11 @@ const Panels = (() => {
   function plot(panel, element) {
     const colour = style("--dim"), grid = {stroke: style("--grid"), width: 1};
     const axis = {stroke: colour, grid, ticks: grid, font: "12px system-ui, sans-serif"};
-    const values = (_, splits) => splits.map((one) => (one === null ? "" : short(Math.abs(one) < 1e-12 * Math.abs(splits.at(-1) - splits[0]) ? 0 : one)));
+    const values = (_, splits) => splits.map((one) => (one === null ? "" : short(Math.abs(one) < 1e-12 * Math.abs(splits.at(-1) - splits[0]) ? 0 : one, [splits[0], splits.at(-1)])));
     const u = new uPlot({
       width: element.clientWidth, height: element.clientHeight || LEAST, padding: [8, RIGHT, 0, 0],
       scales: {x: {time: false, range: () => panel.range[0]}, y: {range: () => panel.range[1]}},
-      axes: [{...axis, size: 30, values}, {...axis, size: LEFT, values}],
+      axes: [{...axis, size: 30, values, space: (_, k, low, high) => Math.max(60, 16 + 7 * short(high, [low, high]).length)}, {...axis, size: LEFT, values}],
       series: [{}, {paths: () => null, points: {show: false}}],
       legend: {show: false},
       cursor: {points: {show: false}, y: Boolean(panel.x), drag: {x: true, y: true, uni: 25, setScale: false}, bind: {dblclick: () => null}},
@@ -293,7 +293,7 @@ const Panels = (() => {
         const pin = panel.u?.over.querySelector(`.pin.${name}`), px = at === null || panel.x ? -1 : panel.u?.valToPos(at, "x");
         if (pin) pin.style.transform = `translateX(${px >= 0 && px <= panel.u.over.clientWidth ? px : -10}px)`;
       }
-      for (const curve of panel.curves) if (curve.reading) curve.reading.textContent = reading(curve, time);
+      for (const curve of panel.curves) if (curve.reading) curve.reading.textContent = reading(curve, time, panel.range[1]);
     }
     for (const band of self.bands) for (const curve of band.curves)
       if (curve.reading) curve.reading.textContent = time === null ? "" : word(band, curve, time);
@@ -305,10 +305,10 @@ const Panels = (() => {
     return sides.length ? `= ${[...new Set(sides)].join(" → ")}` : "";
   }
 
-  function reading(curve, time) {
+  function reading(curve, time, range) {
     const now = time === null ? null : Data.at(curve, time);
     if (!now) return "";
-    const text = now[0] === now[1] ? short(now[1]) : `${short(now[0])} → ${short(now[1])}`;
+    const text = [...new Set(now)].map((one) => short(one, range)).join(" → ");
     const [a, b] = [self.a, self.b].map((one) => (one === null ? null : Data.at(curve, one)));
     return a && b && hovered === null ? `${text} (Δ ${short(b[1] - a[1])})` : text;
   }
@@ -333,24 +333,27 @@ const Panels = (() => {
       box.append(frame);
       panel.room = room;
     }
+    sizes.disconnect();
+    sizes.observe(strip);
     for (const panel of self.panels) {
       panel.range = self.limits(panel);
       panel.u = plot(panel, panel.room);
+      sizes.observe(panel.room);
     }
     self.redraw();
     Tree.refresh();
   };
 
+  const sizes = new ResizeObserver(() => requestAnimationFrame(() => {
+    for (const panel of self.panels)
+      if (panel.u && panel.room.clientWidth > 0 && (panel.u.width !== panel.room.clientWidth || panel.u.height !== panel.room.clientHeight))
+        panel.u.setSize({width: panel.room.clientWidth, height: panel.room.clientHeight});
+    for (const band of self.bands) for (const curve of band.curves) Legend.paintBand(band, curve, self.times());
+    self.readings();
+  }));
+
   self.start = (panels, bands) => {
     [box, strip] = [panels, bands];
-    const sizes = new ResizeObserver(() => requestAnimationFrame(() => {
-      for (const panel of self.panels)
-        if (panel.u && panel.room.clientWidth > 0 && (panel.u.width !== panel.room.clientWidth || panel.u.height !== panel.room.clientHeight))
-          panel.u.setSize({width: panel.room.clientWidth, height: panel.room.clientHeight});
-      for (const band of self.bands) for (const curve of band.curves) Legend.paintBand(band, curve, self.times());
-      self.readings();
-    }));
-    sizes.observe(box);
     Curves.onTheme(self.layout);
   };
   self.curvesOf = curvesOf;

@@ -2,6 +2,7 @@
 "use strict";
 const Tree = (() => {
   const MOST = 300; // rows of a search
+  const FEW = 9; // elements of a vector that is ticked whole
   const self = {ticked: () => false, onTick: () => {}, onX: () => {}};
   let root, box, wanted = "";
 
@@ -47,6 +48,8 @@ const Tree = (() => {
       count.textContent = leaves(node);
       line.append(arrow, label, count);
       line.onclick = () => { node.open = !node.open; draw(); };
+      const elements = [...node.children.values()].map((child) => child.variable);
+      if (elements.every((one) => one?.name.includes("[")) && elements.length <= FEW) arrow.after(all(elements, name));
     } else {
       line.dataset.name = variable.name;
       const tick = document.createElement("input");
@@ -75,6 +78,20 @@ const Tree = (() => {
     }
     line.onkeydown = (event) => keys(event, line);
     return line;
+  }
+
+  // the tick of a whole vector
+  function all(elements, name) {
+    const tick = document.createElement("input");
+    tick.type = "checkbox";
+    tick.title = `all of ${name}`;
+    tick.checked = elements.every(self.ticked);
+    tick.onclick = async (event) => {
+      event.stopPropagation();
+      const wanted = tick.checked;
+      for (const one of elements) if (self.ticked(one) !== wanted) await self.onTick(one);
+    };
+    return tick;
   }
 
   function keys(event, line) {
@@ -135,8 +152,9 @@ const Tree = (() => {
   return self;
 })();
 
-// a number in six digits
-function short(value) {
+// a number in six digits, or as many as tell it from others of a range
+function short(value, range = [0, 0]) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  return String(Number(value.toPrecision(6))).replace("e+", "e");
+  const more = Math.ceil(Math.log10(Math.abs(value) / (range[1] - range[0]))) + 4;
+  return String(Number(value.toPrecision(Math.min(Math.max(6, Number.isFinite(more) ? more : 0), 15)))).replace("e+", "e");
 }
