@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     from gantrytau.results.result import Result
     from gantrytau.simulation.simulate import simulate
     from gantrytau.viewing.animate import animate, view
+    from gantrytau.viewing.browse import browse
     from gantrytau.whole_files import replacing
 else:
     __getattr__, __dir__ = door(__name__)
@@ -148,6 +149,7 @@ __all__ = [
     "atan2",
     "between",
     "branch",
+    "browse",
     "c_source",
     "ceil",
     "check",

@@ -105,6 +105,13 @@ class Columns:
         """The unit of a column as it is written, None without one."""
         return self.units[self._index(name)]
 
+    def si_unit(self, name: str) -> str:
+        """The unit of the numbers of `column`, "" without one."""
+        unit = self._scale(self._index(name), ())
+        if unit is None:
+            return ""
+        return unit.text if unit.slope == 1 and not unit.zero else unit.coherent
+
     def column(
         self, name: str, *units: str, filled: bool = False, si: bool = True, place: int | None = None
     ) -> np.ndarray:

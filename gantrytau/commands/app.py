@@ -52,6 +52,10 @@ PLACES = {  # name -> module, example
         "gantrytau equations GantryTau --given tool.r --find carts[0].s,carts[1].s,carts[2].s",
     ),
     "view": ("view_command", "gantrytau view 'GantryTau(L1)' --pose 'tool.r=[0.5, 3, -0.6]' -o robot.html"),
+    "browse": (
+        "browse_command",
+        "gantrytau simulate Pendulum --output swing.nc && gantrytau browse swing.nc",
+    ),
     "library": ("library_command", "gantrytau library --json"),
     "describe": ("describe_command", "gantrytau describe Revolute"),
     "new": ("new", ""),

@@ -17,8 +17,10 @@ from gantrytau.language.self_description.appearance import (
     Stick,
     Triad,
 )
+from gantrytau.viewing.packed_runs import LARGEST
 
 __all__ = [
+    "LARGEST",
     "Ball",
     "Cloud",
     "Cuboid",

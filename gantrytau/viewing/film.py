@@ -124,14 +124,7 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
 
     Raises ModelError for what has no motion in it, or nothing that could be seen.
     """
-    moved = getattr(shown, "motion", None)  # of a plan
-    series = (
-        shown if isinstance(shown, Series) else moved() if callable(moved) else getattr(shown, "result", None)
-    )
-    if not isinstance(series, Result):
-        raise ModelError(
-            f"animate: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"
-        )
+    series = series_of("animate", shown)
     constants = dict(getattr(shown, "parameters", {}))
     shapes = series.shapes
     if model is not None and not shapes:
@@ -156,6 +149,19 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     bindings = tuple(Binding(arc.name, arc.begin, arc.end) for arc in arcs if arc.side in ("max", "min"))
     times = np.linspace(first, last, pictures + 1)
     return Film(series, times, step, constants, bindings, shapes, tuple(_surroundings(around)))
+
+
+def series_of(verb: str, shown: Any) -> Result:
+    """The result in what simulate, optimize or plan_calibration returned; ModelError for something else."""
+    moved = getattr(shown, "motion", None)  # of a plan
+    series = (
+        shown if isinstance(shown, Series) else moved() if callable(moved) else getattr(shown, "result", None)
+    )
+    if not isinstance(series, Result):
+        raise ModelError(
+            f"{verb}: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"
+        )
+    return series
 
 
 def _root(series: Series, shapes: Sequence[Shape]) -> str:

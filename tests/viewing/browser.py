@@ -73,6 +73,19 @@ class Tab:
             buttons = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
             self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **buttons)
 
+    def drag(self, begin: float, end: float, y: float) -> None:
+        """Move the mouse from one x to another with its left button pressed, in pixels."""
+        button = {"button": "left", "clickCount": 1}
+        for kind, x, more in (
+            ("mouseMoved", begin, {}),
+            ("mousePressed", begin, button),
+            ("mouseMoved", (begin + end) / 2, {"buttons": 1}),
+            ("mouseMoved", end, {"buttons": 1}),
+            ("mouseReleased", end, button),
+        ):
+            self._ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+            self.rest(0.05)
+
     def resize(self, width: int, height: int) -> None:
         """Make the window so large, in pixels."""
         size = dict(width=width, height=height, deviceScaleFactor=1, mobile=False)

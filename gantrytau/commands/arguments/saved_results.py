@@ -1,6 +1,8 @@
-"""A result that was saved before, read again: where the search for an optimum starts, or a motion to be seen."""
+"""A result that was saved before, read again: where the search for an optimum starts, or what is to be seen."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,52 +13,134 @@ from gantrytau.commands.printing.reporting import CommandError
 if TYPE_CHECKING:
     from gantrytau import Result
 
-FORMATS = (".csv", ".nc")
+_MODES = re.compile(r": (0 \w+(?:, \d+ \w+)+)$")  # of a description, as Mode writes it
+TEXT = 24  # bytes of a number in a CSV file
 
 
-def read_result(file: Path, option: str = "--guess") -> "Result":
-    """The variables of a CSV or netCDF file as `Result.save` writes it; CommandError naming the option for another."""
-    from gantrytau import ModelError, Result
+@dataclass
+class _Saved:
+    """What a file holds of a result by name. wanted: variables, and components, that are read, all if none."""
 
-    if file.suffix.lower() not in FORMATS:
+    option: str
+    wanted: Sequence[str]
+    most: float
+    values: dict[str, Any] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)
+    displays: dict[str, str] = field(default_factory=dict)
+    known: list[str] = field(default_factory=list)
+
+    def reads(self, name: str) -> bool:
+        """Whether a variable, or an element of it, is wanted, or a component in which it is, with derivatives."""
+        self.known.append(name)
+        if not self.wanted or name == "time":
+            return True
+        plain = name.rstrip(")").rpartition("der(")[2]
+        return any(
+            one in (name, plain) or plain.startswith((f"{one}.", f"{one}[")) or one.startswith(f"{name}[")
+            for one in self.wanted
+        )
+
+    def told(self, name: str, unit: str, words: str) -> None:
+        """Say the unit and the description of a variable."""
+        self.units |= {name: unit} if unit else {}
+        self.words |= {name: words} if words else {}
+
+    def check_size(self, numbers: float, remedy: str = "choose variables, --names tool.r,carts[0]") -> None:
+        """CommandError, before they are read, for more numbers than a memory should hold."""
+        if numbers > self.most:
+            size, most = (f"{8e-6 * count:,.0f} MB" for count in (numbers, self.most))
+            raise CommandError(f"{self.option}: found {size} of numbers, expected at most {most}; {remedy}")
+
+
+def read_result(
+    file: Path, option: str = "--guess", wanted: Sequence[str] = (), most: float = np.inf
+) -> "Result":
+    """The variables of a file as `Result.save` writes it, with units and descriptions where the format has them.
+
+    wanted: variables and components that are read, all if none; most: numbers that may be read. CommandError naming the
+    option for what cannot be read.
+    """
+    from gantrytau import ModelError, Result, did_you_mean
+
+    place = f"{option} {file}".strip()
+    reader = FORMATS.get(file.suffix.lower())
+    if reader is None:
         raise CommandError(
-            f"{option} {file}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
+            f"{place}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
         )
     if not file.is_file():
-        raise CommandError(f"{option} {file}: there is no such file; check its path")
+        raise CommandError(f"{place}: there is no such file; check its path")
+    saved = _Saved(place, wanted, most)
     try:
-        values = _columns(file) if file.suffix.lower() == ".csv" else _netcdf(file, option)
-        time = values.pop("time")
+        reader(file, saved)
+        time = saved.values.pop("time")
         if time.size < 2 or not np.ptp(time) > 0:
-            raise CommandError(f"{option} {file}: found {time.size} times, expected a motion over some time")
-        return Result(time, values, title=file.name)
+            raise CommandError(f"{place}: found {time.size} times, expected a motion over some time")
+        if wanted and not saved.values:
+            near = "".join(did_you_mean(name, saved.known) for name in wanted[:1])
+            raise CommandError(f"--names {','.join(wanted)}: found none of them in {file}{near}")
+        modes = {name: _modes(words) for name, words in saved.words.items() if _MODES.search(words)}
+        return Result(
+            time,
+            saved.values,
+            units=saved.units,
+            descriptions=saved.words,
+            title=file.name,
+            modes=modes,
+            held=modes,
+            displays=saved.displays,
+        )
     except KeyError as error:
-        raise CommandError(f"{option} {file}: found no {error}, expected a result over time") from error
-    except (OSError, ValueError, ModelError) as error:
-        raise CommandError(f"{option} {file}: cannot be read as a result ({error})") from error
-
-
-def _columns(file: Path) -> dict[str, Any]:
-    """Column by name, without its unit, in SI."""
-    from gantrytau import Columns
-
-    table = Columns.read(file)
-    return {name: table.column(name) for name in table.names}
-
-
-def _netcdf(file: Path, option: str) -> dict[str, Any]:
-    """Scalar by name; vectors and matrices are written whole."""
-    try:
-        import h5netcdf  # noqa: F401 - xarray would tell of an unknown engine
-        import xarray
-
-        with xarray.open_dataset(file, engine="h5netcdf") as opened:
-            values = {str(name): np.asarray(array.values, float) for name, array in opened.variables.items()}
+        raise CommandError(f"{place}: found no {error}, expected a result over time") from error
     except ImportError as error:
         raise CommandError(
-            f"{option} {file}: netCDF needs what is not installed; pip install 'gantrytau[results]'"
+            f"{place}: {file.suffix} needs what is not installed; pip install 'gantrytau[results]'"
         ) from error
-    return dict(pair for name, array in values.items() for pair in _scalars(name, array))
+    except (OSError, ValueError, ModelError) as error:
+        raise CommandError(f"{place}: cannot be read as a result ({error})") from error
+
+
+def _modes(words: str) -> list[str]:
+    found = _MODES.search(words)
+    return [one.split()[1] for one in found[1].split(", ")] if found else []
+
+
+def _csv(file: Path, saved: _Saved) -> None:
+    from gantrytau import Columns
+
+    saved.check_size(file.stat().st_size / TEXT, "save it as .nc, and choose variables")
+    table = Columns.read(file)
+    for name in filter(saved.reads, table.names):
+        saved.values[name] = table.column(name)
+        saved.told(name, table.si_unit(name), "")
+        saved.displays[name] = table.unit(name) or ""
+
+
+def _parquet(file: Path, saved: _Saved) -> None:
+    import pyarrow.parquet as parquet
+
+    with parquet.ParquetFile(file) as opened:
+        names = [name for name in opened.schema_arrow.names if saved.reads(name)]
+        saved.check_size(opened.metadata.num_rows * len(names))
+        table = opened.read(columns=names)
+        for name in names:
+            saved.values[name] = np.asarray(table.column(name).to_numpy(), float)
+            said = table.schema.field(name).metadata or {}
+            saved.told(name, said.get(b"units", b"").decode(), said.get(b"long_name", b"").decode())
+
+
+def _netcdf(file: Path, saved: _Saved) -> None:
+    """Vectors and matrices are written whole."""
+    import h5netcdf  # noqa: F401 - xarray would tell of an unknown engine
+    import xarray
+
+    with xarray.open_dataset(file, engine="h5netcdf") as opened:
+        kept = {str(name): array for name, array in opened.variables.items() if saved.reads(str(name))}
+        saved.check_size(sum(array.size for array in kept.values()))
+        for name, array in kept.items():
+            saved.told(name, array.attrs.get("units", ""), array.attrs.get("long_name", ""))
+            saved.values.update(_scalars(name, np.asarray(array.values, float)))
 
 
 def _scalars(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -65,3 +149,6 @@ def _scalars(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     for index in np.ndindex(*array.shape[1:]):
         place = f"[{','.join(map(str, index))}]" if index else ""
         yield f"{inside}{place}{name[len(inside) :]}", array[(slice(None), *index)]
+
+
+FORMATS: dict[str, Callable[[Path, _Saved], None]] = {".csv": _csv, ".nc": _netcdf, ".parquet": _parquet}
