@@ -13,6 +13,7 @@ user's own that can be written to, all functions remain as they are.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import platform
 import shlex
@@ -32,6 +33,10 @@ if TYPE_CHECKING:
 VARIABLE = "GANTRYTAU_CACHE"
 FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")  # no sum is rounded otherwise than by CasADi
 WORTH = 2e7  # instructions of all calls of a function, 0.1 s in CasADi's virtual machine: fewer are not worth a kernel
+LEAST = 1000  # calls: to hash a function and to write it as C takes as long as 700
+PATIENCE = 5  # times as many calls as are worth a kernel: after these one is made where no more are foretold
+LOOK = 0.1  # s between two looks for a kernel
+SMALL = 10_000  # instructions that -O1 compiles within a second
 OFTEN = 1e5  # calls: -O1 takes six times as long to compile as -O0 and makes them three times as fast
 MOST = 300_000  # instructions of a function: more take a compiler minutes
 LONGEST = 300.0  # s, that it may take
@@ -43,30 +48,74 @@ AT_ONCE = 8  # kernels that are compiled at the same time by all processes of a 
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # as CasADi asks for it
 
 
+class Kernel:
+    """A function that is called again and again: itself at first, its kernel from when there is one."""
+
+    def __init__(
+        self,
+        function: ca.Function,
+        instructions: int | None = None,
+        level: str = "",
+        priority: int = PRIORITY,
+    ):
+        """instructions: of one call, if it calls other functions; level, priority: of the compiler."""
+        self.function, self._priority = function, priority
+        own = function.n_instructions()
+        self._instructions = own if instructions is None else instructions
+        plain = function.is_a("SXFunction")  # others have loops, which -O2 makes faster by a quarter
+        self._level = level or (("-O1" if own <= SMALL else "-O0") if plain else "-O2")
+        self._calls = 0.0
+        self._next = 0.0 if own <= MOST else math.inf  # look into the cache, s
+        self._key, self._folder, self._command = "", Path(), [""]
+
+    def called(self, calls: float, ahead: float = 0.0, *, begin: bool = True, wait: bool = False) -> bool:
+        """Count calls; whether `function` has become the kernel by this.
+
+        ahead: calls that are expected besides; begin: whether a compiler begins where there is no kernel; wait: for it.
+        """
+        self._calls += calls
+        expected = self._calls + ahead
+        if expected * self._instructions < WORTH or expected < LEAST or time.monotonic() < self._next:
+            return False
+        begin = begin and (self._calls / PATIENCE + ahead) * self._instructions >= WORTH
+        try:
+            found = self._found(begin, wait)
+        except (OSError, RuntimeError):  # no room or permission; CasADi cannot write this function as C
+            self._next = math.inf
+            return False
+        if found is None:
+            self._next = max(self._next, time.monotonic() + LOOK)
+            return False
+        self.function, self._next = found, math.inf
+        return True
+
+    def _found(self, begin: bool, wait: bool) -> ca.Function | None:
+        """The kernel that is kept; else a process is begun that compiles it, unless another one does."""
+        if not self._key:
+            command, folder = _command(self._level), kernel_folder()
+            if command is None or folder is None:
+                self._next = math.inf
+                return None
+            self._key, self._folder, self._command = _key(self.function, command), folder, command
+        found = _kept(self._folder, self._key, self.function)
+        if found is None and begin:
+            process = _begun(self._folder, self._key, self.function, self._command, self._priority)
+            if process is not None and wait:
+                process.wait()
+                found = _kept(self._folder, self._key, self.function)
+            elif process is not None:  # whoever waits for it takes note of its end
+                threading.Thread(target=process.wait, name="kernel", daemon=True).start()
+        return found
+
+
 def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
     """The function compiled, where that pays, or the function itself.
 
     calls: how often it is expected to be called; wait: whether to wait for a compiler instead of going on without.
     """
-    instructions = function.n_instructions()
-    if instructions * calls < WORTH or instructions > MOST:
-        return function
-    try:
-        command, folder = _command("-O1" if calls > OFTEN else "-O0"), kernel_folder()
-        if command is None or folder is None:
-            return function
-        key = _key(function, command)
-        found = _kept(folder, key, function)
-        if found is None:
-            process = _begun(folder, key, function, command)
-            if process is not None and wait:
-                process.wait()
-                found = _kept(folder, key, function)
-            elif process is not None:  # whoever waits for it takes note of its end
-                threading.Thread(target=process.wait, name="kernel", daemon=True).start()
-        return found or function
-    except (OSError, RuntimeError):  # no room or permission; CasADi cannot write this function as C
-        return function
+    own = Kernel(function, level="-O1" if calls > OFTEN else "-O0")
+    own.called(0.0, calls, wait=wait)
+    return own.function
 
 
 def c_compiler() -> list[str] | None:
@@ -135,7 +184,8 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
         if _digest(path) == path.stem.partition("-")[2]:
             try:
                 found = ca.external(function.name(), str(path))
-                os.utime(path)
+                with suppress(OSError):  # a cache that cannot be written
+                    os.utime(path)
                 return found
             except RuntimeError:
                 with suppress(FileExistsError):
@@ -145,7 +195,7 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
 
 
 def _begun(
-    folder: Path, key: str, function: ca.Function, command: list[str]
+    folder: Path, key: str, function: ca.Function, command: list[str], priority: int
 ) -> subprocess.Popen[bytes] | None:
     """The process that compiles a kernel; None where another one does, or too many are at work."""
     import casadi as ca
@@ -163,9 +213,9 @@ def _begun(
         return None
     generator = ca.CodeGenerator("kernel.c")
     generator.add(function)
-    generator.generate(f"{work}{os.sep}")
+    (work / "kernel.c").write_text(generator.dump())  # OSError on a full disk, where CasADi says nothing
     return subprocess.Popen(
-        [sys.executable, "-I", "-S", __file__, str(work), *command],
+        [sys.executable, "-I", "-S", __file__, str(work), str(priority), *command],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -174,10 +224,10 @@ def _begun(
     )
 
 
-def compile_kernel(work: Path, command: list[str]) -> None:
+def compile_kernel(work: Path, priority: int, command: list[str]) -> None:
     """Compile `kernel.c` of a folder KEY.work and put the kernel beside the folder, which is deleted unless that fails."""
     if hasattr(os, "nice"):
-        os.nice(PRIORITY)
+        os.nice(priority)
     try:
         subprocess.run([*command, "kernel.c", "-o", "kernel", "-lm"], cwd=work, check=True, timeout=LONGEST)
     except subprocess.TimeoutExpired:
@@ -189,7 +239,7 @@ def compile_kernel(work: Path, command: list[str]) -> None:
     made, folder = work / "kernel", work.parent
     os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
     shutil.rmtree(work, ignore_errors=True)
-    kernels = sorted(folder.glob("*-*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    kernels = sorted(folder.glob(f"*-*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     size = 0
     for path in kernels:
         size += path.stat().st_size
@@ -198,4 +248,4 @@ def compile_kernel(work: Path, command: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    compile_kernel(Path(sys.argv[1]), sys.argv[2:])
+    compile_kernel(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
