@@ -4,7 +4,8 @@ Where a kernel is not there yet, the function itself is used while a process of 
 goes on when the caller's process ends. Run as a program, this file is that process. In the folder `kernels` of the cache:
 
     KEY-DIGEST.so   a kernel; KEY: hash of its function, the compiler and its flags; DIGEST: of its content
-    KEY.work        a folder in which it is compiled, or failed: nobody begins anew within RETRY
+    KEY.work        a folder in which it is compiled: nobody else begins within RETRY
+    KEY.failed      that folder where it failed: nobody begins anew within RETRY
 
 The variable GANTRYTAU_CACHE names another folder for the cache; "off" stands for none. Without a compiler or a folder of the
 user's own that can be written to, all functions remain as they are.
@@ -189,7 +190,7 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
                 return found
             except RuntimeError:
                 with suppress(FileExistsError):
-                    (folder / f"{key}.work").mkdir()
+                    (folder / f"{key}.failed").mkdir()
         path.unlink(missing_ok=True)
     return None
 
@@ -201,19 +202,25 @@ def _begun(
     import casadi as ca
 
     now = time.time()
-    for other in (works := list(folder.glob("*.work"))):
-        if now - other.stat().st_mtime > RETRY:
-            shutil.rmtree(other, ignore_errors=True)
-    if len(works) >= AT_ONCE:
-        return None
+    works, failed = list(folder.glob("*.work")), folder / f"{key}.failed"
+    for other in (*works, failed):
+        with suppress(FileNotFoundError):  # another process was quicker
+            if now - other.stat().st_mtime > RETRY:
+                shutil.rmtree(other, ignore_errors=True)
     work = folder / f"{key}.work"
+    if len(works) >= AT_ONCE or failed.exists():
+        return None
     try:
         work.mkdir()
     except FileExistsError:
         return None
-    generator = ca.CodeGenerator("kernel.c")
-    generator.add(function)
-    (work / "kernel.c").write_text(generator.dump())  # OSError on a full disk, where CasADi says nothing
+    try:
+        generator = ca.CodeGenerator("kernel.c")
+        generator.add(function)
+        (work / "kernel.c").write_text(generator.dump())  # OSError on a full disk, where CasADi says nothing
+    except (OSError, RuntimeError):
+        _give_up(work)
+        raise
     return subprocess.Popen(
         [sys.executable, "-I", "-S", __file__, str(work), str(priority), *command],
         stdin=subprocess.DEVNULL,
@@ -224,20 +231,27 @@ def _begun(
     )
 
 
+def _give_up(work: Path) -> None:
+    """Leave a note that a kernel failed, without what takes room."""
+    with suppress(OSError):
+        work.rename(failed := work.with_suffix(".failed"))
+        for path in failed.iterdir():
+            path.unlink(missing_ok=True)
+
+
 def compile_kernel(work: Path, priority: int, command: list[str]) -> None:
-    """Compile `kernel.c` of a folder KEY.work and put the kernel beside the folder, which is deleted unless that fails."""
+    """Compile `kernel.c` of a folder KEY.work and put the kernel beside it; the folder is deleted, or renamed KEY.failed."""
     if hasattr(os, "nice"):
         os.nice(priority)
     try:
         subprocess.run([*command, "kernel.c", "-o", "kernel", "-lm"], cwd=work, check=True, timeout=LONGEST)
-    except subprocess.TimeoutExpired:
-        if os.name == "posix":
+        made, folder = work / "kernel", work.parent
+        os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
+    except (subprocess.SubprocessError, OSError) as error:
+        _give_up(work)
+        if isinstance(error, subprocess.TimeoutExpired) and os.name == "posix":
             os.killpg(0, signal.SIGKILL)  # this process and all that the compiler has begun
         return
-    except (subprocess.SubprocessError, OSError):
-        return
-    made, folder = work / "kernel", work.parent
-    os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
     shutil.rmtree(work, ignore_errors=True)
     kernels = sorted(folder.glob(f"*-*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     size = 0
