@@ -55,18 +55,18 @@ class Kernel:
     def __init__(
         self,
         function: ca.Function,
-        instructions: int | None = None,
+        instructions: float | None = None,
         level: str = "",
         priority: int = PRIORITY,
     ):
-        """instructions: of one call, if it calls other functions; level, priority: of the compiler."""
+        """instructions: of one call, where functions in it are called repeatedly; level, priority: of the compiler."""
         self.function, self._priority = function, priority
-        own = function.n_instructions()
-        self._instructions = own if instructions is None else instructions
-        plain = function.is_a("SXFunction")  # others have loops, which -O2 makes faster by a quarter
-        self._level = level or (("-O1" if own <= SMALL else "-O0") if plain else "-O2")
+        size = code_size(function)
+        self._instructions = size if instructions is None else instructions
+        quick = "-O1" if function.is_a("SXFunction") else "-O2"  # by a quarter, where there are loops
+        self._level = level or (quick if size <= SMALL else "-O0")
         self._calls = 0.0
-        self._next = 0.0 if own <= MOST else math.inf  # look into the cache, s
+        self._next = 0.0 if size <= MOST else math.inf  # look into the cache, s
         self._key, self._folder, self._command = "", Path(), [""]
 
     def called(self, calls: float, ahead: float = 0.0, *, begin: bool = True, wait: bool = False) -> bool:
@@ -107,6 +107,14 @@ class Kernel:
             elif process is not None:  # whoever waits for it takes note of its end
                 threading.Thread(target=process.wait, name="kernel", daemon=True).start()
         return found
+
+
+def code_size(function: ca.Function) -> float:
+    """Instructions of a function and of those that it calls; inf where one of them is no more than a library's name."""
+    if function.class_name() == "External":
+        return math.inf
+    own = function.n_instructions() if function.is_a("SXFunction") or function.is_a("MXFunction") else 0
+    return own + sum(code_size(called) for called in function.find_functions(0))
 
 
 def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:

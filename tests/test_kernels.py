@@ -173,6 +173,13 @@ def test_whatever_fails_the_function_stays(cache, monkeypatch, trouble):
     assert same(compiled())
 
 
+@compiling
+def test_what_calls_a_library_is_left(cache):
+    x = ca.SX.sym("x", 2)
+    function = ca.Function("outer", [x], [compiled()(x) + 1])
+    assert kernel(function, CALLS, wait=True) is function
+
+
 def test_what_does_not_pay_is_left(cache):
     function = tiny()
     assert kernel(function, 1.0) is function

@@ -19,13 +19,14 @@ class AtPlaces:
     def __init__(self, function: ca.Function):
         self.function = function
         self._lock = Lock()
-        self._kernel = Kernel(function) if function.is_a("SXFunction") else None
+        written = function.is_a("SXFunction") or function.is_a("MXFunction")
+        self._kernel = Kernel(function) if written else None
         self._memories = {1: self._memory(function, 1)}
 
     @staticmethod
     def _memory(
         f: ca.Function, size: int
-    ) -> tuple[list[np.ndarray], list[np.ndarray], Callable[[], None], object]:
+    ) -> tuple[list[np.ndarray], list[np.ndarray], Callable[[], None], ca.FunctionBuffer]:
         """Arguments and results of a call at so many places, a row each, the call, and what lives as long as it."""
         given = [np.zeros((size, f.numel_in(k))) for k in range(f.n_in())]
         found = [np.zeros((size, f.numel_out(k))) for k in range(f.n_out())]
@@ -64,7 +65,7 @@ class AtPlaces:
             self._memories[size] = self._memory(
                 self._kernel.function if self._kernel else self.function, size
             )
-        given, results, go, _ = self._memories[size]
+        given, results, go, memory = self._memories[size]
         places = len(found[0])
         varying = []
         for own, array in zip(given, arguments, strict=True):
@@ -76,5 +77,7 @@ class AtPlaces:
             for own, array in varying:
                 own[:] = array[first : first + size]
             go()
+            if memory.ret():  # as a kernel says what CasADi raises
+                raise RuntimeError(f"{self.function.name()} failed")
             for one, own in zip(found, results, strict=True):
                 one[first : first + size] = own
