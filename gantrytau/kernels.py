@@ -4,7 +4,8 @@ Where a kernel is not there yet, the function itself is used while a process of 
 goes on when the caller's process ends. Run as a program, this file is that process. In the folder `kernels` of the cache:
 
     KEY-DIGEST.so   a kernel; KEY: hash of its function, the compiler and its flags; DIGEST: of its content
-    KEY.work        a folder in which it is compiled, or failed: nobody begins anew within RETRY
+    KEY.work        a folder in which it is compiled: nobody else begins within RETRY
+    KEY.failed      that folder where it failed: nobody begins anew within RETRY
 
 The variable GANTRYTAU_CACHE names another folder for the cache; "off" stands for none. Without a compiler or a folder of the
 user's own that can be written to, all functions remain as they are.
@@ -13,6 +14,7 @@ user's own that can be written to, all functions remain as they are.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import platform
 import shlex
@@ -32,6 +34,10 @@ if TYPE_CHECKING:
 VARIABLE = "GANTRYTAU_CACHE"
 FLAGS = ("-fPIC", "-shared", "-ffp-contract=off")  # no sum is rounded otherwise than by CasADi
 WORTH = 2e7  # instructions of all calls of a function, 0.1 s in CasADi's virtual machine: fewer are not worth a kernel
+LEAST = 1000  # calls: to hash a function and to write it as C takes as long as 700
+PATIENCE = 5  # times as many calls as are worth a kernel: after these one is made where no more are foretold
+LOOK = 0.1  # s between two looks for a kernel
+SMALL = 10_000  # instructions that -O1 compiles within a second
 OFTEN = 1e5  # calls: -O1 takes six times as long to compile as -O0 and makes them three times as fast
 MOST = 300_000  # instructions of a function: more take a compiler minutes
 LONGEST = 300.0  # s, that it may take
@@ -43,30 +49,82 @@ AT_ONCE = 8  # kernels that are compiled at the same time by all processes of a 
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # as CasADi asks for it
 
 
+class Kernel:
+    """A function that is called again and again: itself at first, its kernel from when there is one."""
+
+    def __init__(
+        self,
+        function: ca.Function,
+        instructions: float | None = None,
+        level: str = "",
+        priority: int = PRIORITY,
+    ):
+        """instructions: of one call, where functions in it are called repeatedly; level, priority: of the compiler."""
+        self.function, self._priority = function, priority
+        size = code_size(function)
+        self._instructions = size if instructions is None else instructions
+        quick = "-O1" if function.is_a("SXFunction") else "-O2"  # by a quarter, where there are loops
+        self._level = level or (quick if size <= SMALL else "-O0")
+        self._calls = 0.0
+        self._next = 0.0 if size <= MOST else math.inf  # look into the cache, s
+        self._key, self._folder, self._command = "", Path(), [""]
+
+    def called(self, calls: float, ahead: float = 0.0, *, begin: bool = True, wait: bool = False) -> bool:
+        """Count calls; whether `function` has become the kernel by this.
+
+        ahead: calls that are expected besides; begin: whether a compiler begins where there is no kernel; wait: for it.
+        """
+        self._calls += calls
+        expected = self._calls + ahead
+        if expected * self._instructions < WORTH or expected < LEAST or time.monotonic() < self._next:
+            return False
+        begin = begin and (self._calls / PATIENCE + ahead) * self._instructions >= WORTH
+        try:
+            found = self._found(begin, wait)
+        except (OSError, RuntimeError):  # no room or permission; CasADi cannot write this function as C
+            self._next = math.inf
+            return False
+        if found is None:
+            self._next = max(self._next, time.monotonic() + LOOK)
+            return False
+        self.function, self._next = found, math.inf
+        return True
+
+    def _found(self, begin: bool, wait: bool) -> ca.Function | None:
+        """The kernel that is kept; else a process is begun that compiles it, unless another one does."""
+        if not self._key:
+            command, folder = _command(self._level), kernel_folder()
+            if command is None or folder is None:
+                self._next = math.inf
+                return None
+            self._key, self._folder, self._command = _key(self.function, command), folder, command
+        found = _kept(self._folder, self._key, self.function)
+        if found is None and begin:
+            process = _begun(self._folder, self._key, self.function, self._command, self._priority)
+            if process is not None and wait:
+                process.wait()
+                found = _kept(self._folder, self._key, self.function)
+            elif process is not None:  # whoever waits for it takes note of its end
+                threading.Thread(target=process.wait, name="kernel", daemon=True).start()
+        return found
+
+
+def code_size(function: ca.Function) -> float:
+    """Instructions of a function and of those that it calls; inf where one of them is no more than a library's name."""
+    if function.class_name() == "External":
+        return math.inf
+    own = function.n_instructions() if function.is_a("SXFunction") or function.is_a("MXFunction") else 0
+    return own + sum(code_size(called) for called in function.find_functions(0))
+
+
 def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
     """The function compiled, where that pays, or the function itself.
 
     calls: how often it is expected to be called; wait: whether to wait for a compiler instead of going on without.
     """
-    instructions = function.n_instructions()
-    if instructions * calls < WORTH or instructions > MOST:
-        return function
-    try:
-        command, folder = _command("-O1" if calls > OFTEN else "-O0"), kernel_folder()
-        if command is None or folder is None:
-            return function
-        key = _key(function, command)
-        found = _kept(folder, key, function)
-        if found is None:
-            process = _begun(folder, key, function, command)
-            if process is not None and wait:
-                process.wait()
-                found = _kept(folder, key, function)
-            elif process is not None:  # whoever waits for it takes note of its end
-                threading.Thread(target=process.wait, name="kernel", daemon=True).start()
-        return found or function
-    except (OSError, RuntimeError):  # no room or permission; CasADi cannot write this function as C
-        return function
+    own = Kernel(function, level="-O1" if calls > OFTEN else "-O0")
+    own.called(0.0, calls, wait=wait)
+    return own.function
 
 
 def c_compiler() -> list[str] | None:
@@ -135,37 +193,44 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
         if _digest(path) == path.stem.partition("-")[2]:
             try:
                 found = ca.external(function.name(), str(path))
-                os.utime(path)
+                with suppress(OSError):  # a cache that cannot be written
+                    os.utime(path)
                 return found
             except RuntimeError:
                 with suppress(FileExistsError):
-                    (folder / f"{key}.work").mkdir()
+                    (folder / f"{key}.failed").mkdir()
         path.unlink(missing_ok=True)
     return None
 
 
 def _begun(
-    folder: Path, key: str, function: ca.Function, command: list[str]
+    folder: Path, key: str, function: ca.Function, command: list[str], priority: int
 ) -> subprocess.Popen[bytes] | None:
     """The process that compiles a kernel; None where another one does, or too many are at work."""
     import casadi as ca
 
     now = time.time()
-    for other in (works := list(folder.glob("*.work"))):
-        if now - other.stat().st_mtime > RETRY:
-            shutil.rmtree(other, ignore_errors=True)
-    if len(works) >= AT_ONCE:
-        return None
+    works, failed = list(folder.glob("*.work")), folder / f"{key}.failed"
+    for other in (*works, failed):
+        with suppress(FileNotFoundError):  # another process was quicker
+            if now - other.stat().st_mtime > RETRY:
+                shutil.rmtree(other, ignore_errors=True)
     work = folder / f"{key}.work"
+    if len(works) >= AT_ONCE or failed.exists():
+        return None
     try:
         work.mkdir()
     except FileExistsError:
         return None
-    generator = ca.CodeGenerator("kernel.c")
-    generator.add(function)
-    generator.generate(f"{work}{os.sep}")
+    try:
+        generator = ca.CodeGenerator("kernel.c")
+        generator.add(function)
+        (work / "kernel.c").write_text(generator.dump())  # OSError on a full disk, where CasADi says nothing
+    except (OSError, RuntimeError):
+        _give_up(work)
+        raise
     return subprocess.Popen(
-        [sys.executable, "-I", "-S", __file__, str(work), *command],
+        [sys.executable, "-I", "-S", __file__, str(work), str(priority), *command],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -174,22 +239,29 @@ def _begun(
     )
 
 
-def compile_kernel(work: Path, command: list[str]) -> None:
-    """Compile `kernel.c` of a folder KEY.work and put the kernel beside the folder, which is deleted unless that fails."""
+def _give_up(work: Path) -> None:
+    """Leave a note that a kernel failed, without what takes room."""
+    with suppress(OSError):
+        work.rename(failed := work.with_suffix(".failed"))
+        for path in failed.iterdir():
+            path.unlink(missing_ok=True)
+
+
+def compile_kernel(work: Path, priority: int, command: list[str]) -> None:
+    """Compile `kernel.c` of a folder KEY.work and put the kernel beside it; the folder is deleted, or renamed KEY.failed."""
     if hasattr(os, "nice"):
-        os.nice(PRIORITY)
+        os.nice(priority)
     try:
         subprocess.run([*command, "kernel.c", "-o", "kernel", "-lm"], cwd=work, check=True, timeout=LONGEST)
-    except subprocess.TimeoutExpired:
-        if os.name == "posix":
+        made, folder = work / "kernel", work.parent
+        os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
+    except (subprocess.SubprocessError, OSError) as error:
+        _give_up(work)
+        if isinstance(error, subprocess.TimeoutExpired) and os.name == "posix":
             os.killpg(0, signal.SIGKILL)  # this process and all that the compiler has begun
         return
-    except (subprocess.SubprocessError, OSError):
-        return
-    made, folder = work / "kernel", work.parent
-    os.replace(made, folder / f"{work.stem}-{_digest(made)}{SUFFIX}")
     shutil.rmtree(work, ignore_errors=True)
-    kernels = sorted(folder.glob("*-*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    kernels = sorted(folder.glob(f"*-*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     size = 0
     for path in kernels:
         size += path.stat().st_size
@@ -198,4 +270,4 @@ def compile_kernel(work: Path, command: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    compile_kernel(Path(sys.argv[1]), sys.argv[2:])
+    compile_kernel(Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])

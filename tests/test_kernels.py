@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gantrytau import kernels
-from gantrytau.kernels import c_compiler, kernel
+from gantrytau.kernels import Kernel, c_compiler, kernel
 
 CALLS = 1e9
 compiling = pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
@@ -19,6 +19,15 @@ import casadi as ca
 from gantrytau.kernels import kernel
 x = ca.SX.sym("x", 2)
 kernel(ca.Function("tiny", [x], [ca.sin(x[0]) * x[1]]), 1e9, wait=True)
+"""
+FULL_DISK = """
+import resource, sys
+import casadi as ca
+from gantrytau.kernels import kernel
+x = ca.SX.sym("x", 2)
+function = ca.Function("tiny", [x], [ca.sin(x[0]) * x[1]])
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
+assert kernel(function, 1e9, wait=True) is function
 """
 
 
@@ -82,7 +91,7 @@ def test_what_cannot_be_loaded_is_not_made_again_and_again(cache):
     kept.write_bytes(b"of another machine")
     kept.rename(kept.with_stem(f"{kept.stem.partition('-')[0]}-{kernels._digest(kept)}"))
     assert not is_kernel(compiled())
-    assert [one.suffix for one in cache.iterdir()] == [".work"]
+    assert [one.suffix for one in cache.iterdir()] == [".failed"]
 
 
 @compiling
@@ -91,6 +100,42 @@ def test_two_processes_at_once(cache):
     assert [one.wait(60) for one in both] == [0, 0]
     assert is_kernel(compiled())
     assert len(list(cache.iterdir())) == 1
+
+
+@compiling
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+@pytest.mark.parametrize("size", [1000, 10_000])  # bytes: too few for the C source, and for the kernel
+def test_a_full_disk(cache, size):
+    found = subprocess.run([sys.executable, "-c", FULL_DISK, str(size)], capture_output=True, check=True)
+    assert not found.stdout + found.stderr
+    assert not is_kernel(compiled())
+    (note,) = cache.iterdir()
+    assert note.suffix == ".failed"
+    assert not list(note.iterdir())
+    os.utime(note, (1, 1))
+    assert is_kernel(compiled())
+    assert same(compiled())
+
+
+@compiling
+def test_in_a_loop_from_when_it_is_there(cache):
+    own = Kernel(tiny())
+    few = 2 * kernels.WORTH / tiny().n_instructions()
+    assert not own.called(few)
+    assert not cache.exists() or not list(cache.iterdir())
+    assert not own.called(kernels.PATIENCE * few)
+    end = time.monotonic() + 30
+    while time.monotonic() < end and not own.called(1):
+        time.sleep(0.02)
+    assert is_kernel(own.function)
+    assert Kernel(tiny()).called(few)
+
+
+@compiling
+def test_a_cache_for_reading_only(cache):
+    compiled()
+    cache.chmod(0o500)
+    assert is_kernel(kernel(tiny(), CALLS))
 
 
 @compiling
@@ -126,6 +171,13 @@ def test_whatever_fails_the_function_stays(cache, monkeypatch, trouble):
             cache.chmod(0o777)
     assert not is_kernel(compiled())
     assert same(compiled())
+
+
+@compiling
+def test_what_calls_a_library_is_left(cache):
+    x = ca.SX.sym("x", 2)
+    function = ca.Function("outer", [x], [compiled()(x) + 1])
+    assert kernel(function, CALLS, wait=True) is function
 
 
 def test_what_does_not_pay_is_left(cache):

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -279,7 +280,8 @@ def split_element(name: str) -> tuple[str, tuple[int, ...]] | None:
     return before + behind, tuple(int(number) for number in index.split(","))
 
 
-def _arrays(names: tuple[str, ...]) -> dict[str, np.ndarray]:
+@lru_cache(maxsize=16)  # results of one model have the same names
+def _arrays(names: tuple[str, ...]) -> Mapping[str, np.ndarray]:
     """Array name -> element names in the shape of the array, for arrays all of whose elements exist."""
     found: dict[str, dict[tuple[int, ...], str]] = {}
     for name in names:

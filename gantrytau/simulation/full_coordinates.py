@@ -28,6 +28,7 @@ STEPS = 10
 STALLED = 1e-6  # of the largest one: smaller Newton steps that do not shrink are rounding
 ROUNDING = 4 * np.finfo(float).eps  # of the largest algebraic variable
 LEAST = 1e-3  # of its size, that a coordinate counts in a constraint
+FUNCTIONS = "daeF", "jacF"  # of an integrator: rates with residuals, and their Jacobians
 OPEN = 1e-6  # of the size of a loop, by which a constraint that was left out may be violated
 
 
@@ -129,12 +130,13 @@ class Coordinates:
         steps: int = 100_000,
         modes: Sequence[float] = (),
         longest: float | None = None,
+        functions: Mapping[str, ca.Function] | None = None,
     ) -> ca.Function:
         """An integrator over `count` intervals in the scaled time 0..count.
 
         size: of algebraics, which need not be more exact than `tolerance` of it; steps: at most, to one end; modes: what
         it is made for, so that nothing is left of other pieces (a root that they have may have no derivative), else any.
-        Its states are in units of their sizes. longest: step, in intervals.
+        Its states are in units of their sizes. longest: step, in intervals. functions: its own of FUNCTIONS, made before.
 
         p = (start, interval) in s; if the model is stepwise, per interval u = (start, length, number, w) instead: the
         intervals may differ then.
@@ -166,6 +168,7 @@ class Coordinates:
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
             "linear_solver": "csparse",  # the QR of CasADi fails by entries whose squares are no numbers
+            "cache": dict(functions or {}),
         }
         if longest is not None and np.isfinite(longest):
             options["max_step_size"] = longest
@@ -190,9 +193,9 @@ class Coordinates:
         return self.function("renewed", lambda: [self.renewal])
 
     @property
-    def rates(self) -> ca.Function:
-        """X' as a function."""
-        return self.function("rates", lambda: [self.ode])
+    def rates(self) -> AtPlaces:
+        """X' at places."""
+        return self.kept("rates", lambda: AtPlaces(self.function("rates", lambda: [self.ode])))
 
     def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions of reduced symbols in terms of (t, x, z, w)."""

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from gantrytau.kernels import Kernel
 from gantrytau.simulation.events.at_places import AtPlaces
-from gantrytau.simulation.full_coordinates import Coordinates
+from gantrytau.simulation.full_coordinates import FUNCTIONS, Coordinates
 from gantrytau.simulation.memory.hermite import ORDER, shifted
 from gantrytau.simulation.singular_poses import Point
 
@@ -46,9 +47,7 @@ class Integrators:
         """
         count = len(t) - 1
         p = [t[0], t[1] - t[0]] if courses is None else []
-        found = self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
-        self.steps = int(self._last.stats(1)["nsteps"])  # of the memory that `AtPlaces` has
-        return found
+        return self._integrate(count, self.most, x, z, p, [] if courses is None else courses)
 
     def step(self, point: Point, step: float, most: int = WALKED_STEPS) -> Point:
         """The point a step later, in s; RuntimeError or SolveError where there is none."""
@@ -70,7 +69,7 @@ class Integrators:
         x, z, t, inputs = point
         if step > BRIEF * self.interval:
             return None
-        rates = self.coordinates.kept("rates at one", lambda: AtPlaces(self.coordinates.rates))
+        rates = self.coordinates.rates
         first = rates(x[None], z[None], t, t, inputs[None])[0]
         far = x + step * first
         forces = self.coordinates.settle(far, z[None], when, w)
@@ -115,11 +114,21 @@ class Integrators:
         limits = [step for step in (self.longest, self.shorter) if step is not None]
         longest = min(limits) / self.interval if limits else None
         size, tolerance = self.size, self.tolerance
-        integrator = self.coordinates.kept(
-            ("integrator", count, most, modes, longest, size, tolerance, self.coordinates.sizes),
+        kept, sizes = self.coordinates.kept, self.coordinates.sizes
+        kernels = kept(("kernels of integrators", modes, sizes), dict[str, Kernel])
+        functions = {name: own.function for name, own in kernels.items()}
+        own = tuple(one.class_name() for one in functions.values())
+        integrator = kept(
+            ("integrator", count, most, modes, longest, size, tolerance, sizes, own),
             lambda: AtPlaces(
                 self.coordinates.integrator(
-                    count, tolerance, size=size, steps=most, modes=modes, longest=longest
+                    count,
+                    tolerance,
+                    size=size,
+                    steps=most,
+                    modes=modes,
+                    longest=longest,
+                    functions=functions,
                 )
             ),
         )
@@ -129,7 +138,15 @@ class Integrators:
             far, forces, *_ = integrator(
                 *given, *(0.0 for _ in range(integrator.function.n_in() - len(given)))
             )
-        self._last = integrator.function
+        self._last, stats = (
+            integrator.function,
+            integrator.function.stats(1),
+        )  # of the memory that `AtPlaces` has
+        self.steps = int(stats["nsteps"])
+        for name in FUNCTIONS:
+            if name not in kernels:
+                kernels[name] = Kernel(self._last.get_function(name))
+            kernels[name].called(stats[f"n_call_{name}"])
         reached = far.reshape(count, -1) * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")

@@ -23,7 +23,7 @@ from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.start.balance import NOISE, balance
 from gantrytau.compiler.start.consistency import ROUNDING
 from gantrytau.language.term_sizes import term_sizes
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 
 CLOSE = 1e-3  # smallest singular value of the constraints, relative to that at the start: forces a million times larger
 LOST = 0.3  # of the least singular value at the start: below, the equations of a position that stops the run are named
@@ -88,7 +88,7 @@ class Conditioning:
         self._divisors = len(heads)
         parts = [ca.densify(constraints), *changing]
         everything = ca.densify(ca.vertcat(*heads, *(ca.vec(m) for m in parts)))
-        self._function = ca.Function("conditioning", list(arguments), [everything], {"cse": True})
+        self._values = AtPlaces(ca.Function("conditioning", list(arguments), [everything], {"cse": True}))
         self._symbols = list(arguments), everything
         self._steps = [k for k in steps if ca.depends_on(everything, arguments[-1][k])]
         self._scales: dict[bytes, list[Scale]] = {}
@@ -102,7 +102,7 @@ class Conditioning:
     @property
     def needed(self) -> bool:
         """Whether anything changes at all."""
-        return self._function.numel_out(0) > 0
+        return self._values.function.numel_out(0) > 0
 
     def sides(self, w: np.ndarray) -> np.ndarray:
         """What tells the sides of events apart by which matrices are measured, (points, k), of inputs (points, m)."""
@@ -121,7 +121,7 @@ class Conditioning:
 
     def _look(self, side: np.ndarray, *points: np.ndarray) -> Look:
         """The same on one side of all events; the first point there is the measure."""
-        (values,) = at_places(self._function, *points)
+        (values,) = self._values(*points)
         matrices = self._matrices(values)
         constraints, *blocks = matrices
         scales = self._scales.setdefault(side.tobytes(), [])
@@ -153,7 +153,7 @@ class Conditioning:
         if any(np.any(one) for one in sure):
             arguments, everything = self._symbols
             terms = ca.Function("terms", arguments, [ca.vertcat(*term_sizes(everything.elements()))])
-            rounding = self._matrices(ROUNDING * at_places(terms, *point)[0])
+            rounding = self._matrices(ROUNDING * AtPlaces(terms)(*point)[0])
             sure = [one & (m > r[0]) for one, m, r in zip(sure, sizes, rounding, strict=True)]
         return [one.astype(int) for one in sure]
 

@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.translated import Translated
-from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.time_grid import Trail
 
@@ -92,7 +91,7 @@ def _noise(coordinates: Coordinates, trail: Trail, done: int) -> np.ndarray:
     found = []
     for sign in (-2, -1, 0, 1, 2):
         near = 1 + sign * np.finfo(float).eps
-        found.append(at_places(coordinates.rates, x * near, z * near, t * near, t, w)[0])
+        found.append(coordinates.rates(x * near, z * near, t * near, t, w)[0])
     return np.nan_to_num(np.ptp(found, axis=0)).max(axis=0)
 
 

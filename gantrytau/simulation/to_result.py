@@ -10,7 +10,7 @@ from gantrytau.border.dimensions import per_second
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.results.result import Result
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.full_coordinates import Coordinates
 
 HUGE = 1e100  # no quantity is that large
@@ -35,7 +35,7 @@ def result_of(
     names, steps, function = coordinates.kept(
         ("variables", None if outputs is None else tuple(outputs)), lambda: _variables(coordinates, outputs)
     )
-    (rows,) = at_places(function, times[:, None], x, z, w)
+    (rows,) = function(times[:, None], x, z, w)
     table = dict(zip(names, np.ascontiguousarray(rows.T), strict=True))
     for parameter in dae.flat.parameters if outputs is None else ():
         table.update((n, np.full(times.size, dae.table.values[n])) for n in parameter.elements)
@@ -50,7 +50,7 @@ def result_of(
 
 def _variables(
     coordinates: Coordinates, outputs: Sequence[str] | None
-) -> tuple[list[str], list[str], ca.Function]:
+) -> tuple[list[str], list[str], AtPlaces]:
     """Names of all variables and derivatives (or only `outputs`), of those that hold their values from one time to the next,
     and (t, x, z, w) -> the values of all.
     """
@@ -62,14 +62,14 @@ def _variables(
     events = {*coordinates.held, *coordinates.discretes}
     steps = [n for n in names if (a := dae.root(n)) is not None and a.symbol in events]
     arguments = [time, coordinates.x, coordinates.z, coordinates.w]
-    return names, steps, ca.Function("variables", arguments, [found])
+    return names, steps, AtPlaces(ca.Function("variables", arguments, [found]))
 
 
 def _held_at(coordinates: Coordinates, names: Sequence[str], times: np.ndarray, w: np.ndarray) -> Result:
     """What is held, which follows from w alone, at times."""
     names, _, function = coordinates.kept(("variables", tuple(names)), lambda: _variables(coordinates, names))
     nothing = np.zeros((1, len(coordinates.states))), np.zeros((1, len(coordinates.algebraics)))
-    (rows,) = at_places(function, times, *nothing, w)
+    (rows,) = function(times, *nothing, w)
     return Result(times, dict(zip(names, rows.T, strict=True)), held=names)
 
 
@@ -78,8 +78,7 @@ def doubts(result: Result) -> str:
     found = []
     for name in result.names:
         values = result[name]
-        wrong = values.size and not np.max(np.abs(values)) < HUGE  # NaN is not below either
-        if wrong:
+        if values.size and not -HUGE < values.min() <= values.max() < HUGE:  # NaN is nowhere between
             k = int(np.flatnonzero(~(np.abs(values) < HUGE))[0])
             what = "not finite" if not np.isfinite(values[k]) else f"beyond {HUGE:g}"
             found.append(f"{name} is {what} from t = {result.time[k]:.6g} s on")

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gantrytau.border.refusal import SolveError
-from gantrytau.simulation.events.at_places import at_places
 from gantrytau.simulation.integrators import Integrators
 from gantrytau.simulation.singular_poses import Approach, Point
 from gantrytau.simulation.time_grid import Trail
@@ -56,7 +55,7 @@ def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Acr
         return None
     x, z, _, w = (np.array(p) for p in zip(*points[1:], strict=True))
     t = found.zero + part * np.array([-3.0, -2.0, -1.0, 1.0])
-    rates = at_places(c.rates, x, z, t[:3, None], t[:3, None], w)[0]
+    rates = c.rates(x, z, t[:3, None], t[:3, None], w)[0]
     s = np.arange(3.0)
     powers = np.vander(s, 6, increasing=True)
     slopes = np.hstack([np.zeros((3, 1)), powers[:, :5] * np.arange(1, 6)])
@@ -68,7 +67,7 @@ def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Acr
         return None
     size = np.maximum(np.abs(x).max(axis=0), integrators.sizes)
     forces = c.settle(there, z[2:], when, w[2:])
-    now = at_places(c.rates, there, forces, when[:, None], when[:, None], w[2:])[0]
+    now = c.rates(there, forces, when[:, None], when[:, None], w[2:])[0]
     foretold = (np.append(0.0, 4.0 ** np.arange(5) * np.arange(1, 6)) @ way.coefficients) / part
     missed = np.max(np.abs(there - far) / size)
     bent = np.max(np.abs(now - foretold) / np.maximum(np.abs(rates).max(axis=0), integrators.sizes))

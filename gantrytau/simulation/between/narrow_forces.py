@@ -8,7 +8,7 @@ Where they differ by more than a share of the motion, the interval is integrated
 import casadi as ca
 import numpy as np
 
-from gantrytau.simulation.events.at_places import at_places
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.time_grid import Trail
 
@@ -64,14 +64,14 @@ class NarrowForces:
         c, s = self.coordinates, share
         x, z, t, w = trail.x[places], trail.z[places], trail.t[places], trail.rows(places)
         h = np.diff(t)[:, None]
-        rates = at_places(c.rates, x, z, t[:, None], t[:, None], w)[0]
+        rates = c.rates(x, z, t[:, None], t[:, None], w)[0]
         gone, first, last = np.diff(x, axis=0), rates[:-1], rates[1:]
         inside = x[:-1] + s * s * (3 - 2 * s) * gone + h * s * (1 - s) * ((1 - s) * first - s * last)
         along = 6 * s * (1 - s) * gone / h + (1 - s) * (1 - 3 * s) * first - s * (2 - 3 * s) * last
         begin, at, w = t[:-1], t[:-1] + s * h[:, 0], w[:-1]
         forces = c.settle(inside, (1 - s) * z[:-1] + s * z[1:], at, w)
         point = inside, forces, at[:, None], begin[:, None], w
-        defect = h * (at_places(c.rates, *point)[0] - along)
+        defect = h * (c.rates(*point)[0] - along)
         size = np.maximum(np.maximum(np.abs(x[1:]), np.abs(x[:-1])), sizes)
         lost = ~np.all(np.abs(defect) <= most * size, axis=1)
         for k in np.flatnonzero(lost):  # stiff equations make much of small errors of the states
@@ -85,7 +85,8 @@ class NarrowForces:
         c = self.coordinates
         n, m = len(c.states), len(c.algebraics)
         slopes = [(e, y) for e in (c.ode, c.algebraic) for y in (c.x, c.z)]
-        parts = at_places(c.function("slopes", lambda: [ca.jacobian(*pair) for pair in slopes]), *point)
+        made = c.function("slopes", lambda: [ca.jacobian(*pair) for pair in slopes])
+        parts = c.kept("slopes", lambda: AtPlaces(made))(*point)
         shapes = (n, n), (m, n), (n, m), (m, m)  # columns, rows
         by_x, by_z, own, inner = (
             np.nan_to_num(p[0]).reshape(k).T for p, k in zip(parts, shapes, strict=True)

@@ -1,25 +1,33 @@
 """A function of CasADi at many places, from and to memory of NumPy: its own way there takes longer than most functions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from threading import Lock
 
 import casadi as ca
 import numpy as np
 
-FEW, MANY = 128, 1024  # places in one call of a function that is made for so many
+from gantrytau.kernels import Kernel
+
+SIZES = 64, 8, 1  # places in one call: to make CasADi's map of more takes longer than it saves
 
 
 class AtPlaces:
-    """A function with memory of its own; all arguments are dense columns, all results dense."""
+    """A function with memory of its own, by its kernel where there is one; all arguments are dense columns, all results
+    dense.
+    """
 
     def __init__(self, function: ca.Function):
         self.function = function
         self._lock = Lock()
-        self._memories = {1: self._memory(1)}
+        written = function.is_a("SXFunction") or function.is_a("MXFunction")
+        self._kernel = Kernel(function) if written else None
+        self._memories = {1: self._memory(function, 1)}
 
-    def _memory(self, size: int) -> tuple[list[np.ndarray], list[np.ndarray], Callable[[], None], object]:
+    @staticmethod
+    def _memory(
+        f: ca.Function, size: int
+    ) -> tuple[list[np.ndarray], list[np.ndarray], Callable[[], None], ca.FunctionBuffer]:
         """Arguments and results of a call at so many places, a row each, the call, and what lives as long as it."""
-        f = self.function
         given = [np.zeros((size, f.numel_in(k))) for k in range(f.n_in())]
         found = [np.zeros((size, f.numel_out(k))) for k in range(f.n_out())]
         memory, go = (f if size == 1 else f.map(size)).buffer()
@@ -36,27 +44,40 @@ class AtPlaces:
         least the first has a row for each place.
         """
         places = len(arguments[0])  # type: ignore[arg-type]
-        size = 1 if places < FEW else FEW if places < MANY else MANY
+        f = self.function
+        found = [np.empty((places, f.numel_out(k))) for k in range(f.n_out())]
         with self._lock:
-            if size not in self._memories:
-                self._memories[size] = self._memory(size)
-            given, results, go, _ = self._memories[size]
-            found = [np.empty((places, array.shape[1])) for array in results]
-            for first in range(0, places, size):
-                count = min(size, places - first)
-                for own, array in zip(given, arguments, strict=True):
-                    if not (isinstance(array, np.ndarray) and len(array) == places):
-                        own[:] = array
-                    elif size == 1:
-                        own[0] = array[first]
-                    else:
-                        own[:count] = np.reshape(array[first : first + count], (count, own.shape[1]))
-                go()
-                for one, own in zip(found, results, strict=True):
-                    one[first : first + count] = own[:count]
+            if self._kernel is not None and self._kernel.called(places):
+                self._memories.clear()
+            first = 0
+            for size in SIZES:
+                last = places - (places - first) % size
+                if first < last:
+                    self._fill(size, range(first, last, size), arguments, found)
+                first = last
         return found
 
-
-def at_places(function: ca.Function, *arguments: np.ndarray | float) -> list[np.ndarray]:
-    """Values of a function that is asked seldom, see `AtPlaces`."""
-    return AtPlaces(function)(*arguments)
+    def _fill(
+        self, size: int, firsts: range, arguments: Sequence[np.ndarray | float], found: list[np.ndarray]
+    ) -> None:
+        """Results from the first places on, so many in a call."""
+        if size not in self._memories:
+            self._memories[size] = self._memory(
+                self._kernel.function if self._kernel else self.function, size
+            )
+        given, results, go, memory = self._memories[size]
+        places = len(found[0])
+        varying = []
+        for own, array in zip(given, arguments, strict=True):
+            if isinstance(array, np.ndarray) and len(array) == places:
+                varying.append((own, np.reshape(array, (places, own.shape[1]))))
+            else:
+                own[:] = array
+        for first in firsts:
+            for own, array in varying:
+                own[:] = array[first : first + size]
+            go()
+            if memory.ret():  # as a kernel says what CasADi raises
+                raise RuntimeError(f"{self.function.name()} failed")
+            for one, own in zip(found, results, strict=True):
+                one[first : first + size] = own

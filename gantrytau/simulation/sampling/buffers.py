@@ -6,13 +6,13 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from gantrytau.kernels import Kernel
 from gantrytau.simulation.full_coordinates import Coordinates
-from gantrytau.simulation.sampling.compiled import compiled
 from gantrytau.simulation.sampling.sampling_interval import Passage, passage
 
 CALLS = (1, 8, 64, 512, 4096)  # passages in one call
 LONGEST_CALL = 40_000_000  # instructions: some tenths of a second, for which Ctrl-C has to wait
-WORTH = 10_000  # passages of a model: for so many a compiler is asked, which takes as long as these
+WORTH = 10_000  # passages of a model: for so many it is compiled, which takes as long as these
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,11 @@ class Buffer:
 
 
 class Passages:
-    """Passages of a model: interpreted, or by machine code where there are many and a compiler; the numbers are the same."""
+    """Passages of a model, by its kernel where there is one."""
 
     def __init__(self, coordinates: Coordinates):
         self.coordinates = coordinates
-        self._buffers: dict[tuple[int, bool], Buffer] = {}
+        self._buffers: dict[int, Buffer] = {}
 
     @property
     def one(self) -> Passage:
@@ -74,20 +74,24 @@ class Passages:
     def steps(self, first: np.ndarray, told: np.ndarray, size: int, expected: float) -> StepsTaken:
         """As of `Buffer`, in a call of `size`; expected: how many are left of the run."""
         so_far = self.coordinates.kept("passages so far", lambda: np.zeros(1))
-        key = size, bool(so_far[0] + expected > WORTH and self._machine is not None)
+        many = bool(so_far[0] + expected > WORTH)
         so_far += len(told)
-        if key not in self._buffers:
-            self._buffers[key] = Buffer(
-                self.coordinates.kept(("passages", *key), lambda: self._calls(*key)), size
-            )
-        return self._buffers[key].steps(first, told)
+        if self._kernel.called(len(told), expected, begin=many):
+            self._buffers.clear()
+        if size not in self._buffers:
+            self._buffers[size] = self._buffer(size)
+        return self._buffers[size].steps(first, told)
 
-    def _calls(self, size: int, machine: bool) -> ca.Function:
-        function = self._machine if machine else None
-        function = function or self.one.function
-        return function if size == 1 else function.mapaccum("passages", size)
+    def _buffer(self, size: int) -> Buffer:
+        function = self._kernel.function
+        calls = self.coordinates.kept(
+            ("passages", size, function.class_name()),
+            lambda: function if size == 1 else function.mapaccum("passages", size),
+        )
+        return Buffer(calls, size)
 
     @property
-    def _machine(self) -> ca.Function | None:
-        """The passage compiled, if there is a compiler."""
-        return self.coordinates.kept("compiled passage", lambda: compiled(self.one.function))
+    def _kernel(self) -> Kernel:
+        return self.coordinates.kept(
+            "kernel of passages", lambda: Kernel(self.one.function, self.one.instructions, priority=0)
+        )

@@ -22,6 +22,7 @@ def at_once(tmp_path, monkeypatch):
     """Kernels in a folder of the test, of small functions too, that are waited for; how many there are in the end."""
     monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))
     monkeypatch.setattr(kernels, "WORTH", 0)
+    monkeypatch.setattr(kernels, "LEAST", 0)
     monkeypatch.setattr(
         assemble, "kernel", lambda function, calls: kernels.kernel(function, calls, wait=True)
     )

@@ -27,9 +27,9 @@ from gantrytau import (
     translate,
     when,
 )
+from gantrytau.kernels import c_compiler, kernel
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.sampling.buffers import Buffer
-from gantrytau.simulation.sampling.compiled import compiled
 from gantrytau.simulation.sampling.runge_kutta import one_step
 from gantrytau.simulation.sampling.sampler import Sampler
 from gantrytau.simulation.sampling.sampling_interval import linear, passage
@@ -189,12 +189,13 @@ def test_the_controlled_robot_tracks_as_with_the_integrator(monkeypatch):
     assert np.abs(quick - slow).max() < NEAR
 
 
-def test_machine_code_gives_the_same_numbers_bit_by_bit(monkeypatch):
+@pytest.mark.skipif(c_compiler() is None, reason="no C compiler")
+def test_kernels_give_the_same_numbers_bit_by_bit(monkeypatch, tmp_path):
+    monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))
     coordinates = all_coordinates(translate(ControlledRobot(prototypes.L1), events=True), {})
     function = passage(coordinates).function
-    quick = compiled(function)
-    if quick is None:
-        pytest.skip("no C compiler")
+    quick = kernel(function, 1e9, wait=True)
+    assert quick.class_name() == "External"
     start = coordinates.dae.start
     held = [start[n] for n in coordinates.held] + [0.0] * len(coordinates.switches)
     y = np.array([*(start[n] for n in coordinates.states), *held])
@@ -204,8 +205,6 @@ def test_machine_code_gives_the_same_numbers_bit_by_bit(monkeypatch):
         point = y * random.uniform(0.99, 1.01, y.size)
         for one, other in zip(function(point, told), quick(point, told), strict=True):
             assert np.array_equal(np.array(one), np.array(other), equal_nan=True)
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    assert compiled(function) is None
 
 
 def test_an_interrupt_between_two_calls_keeps_what_was_computed(monkeypatch):
