@@ -128,42 +128,41 @@ def _whole(name: str, graph: ExpressionGraph, body: Sequence[str]) -> str:
 
 
 def tape(graph: ExpressionGraph, functions: Mapping[str, tuple[Sequence[int], int, int]]) -> CFunction:
-    """The functions that runtime/tape.c follows row by row; "" if there are none.
+    """The functions that runtime/tape.c follows row by row.
 
     functions: by name the roots, and from which array to before which the results are their changes along the seeds;
     none of the arrays for the values of the roots.
     """
-    if not functions:
-        return CFunction("gt_play", "", 0, 0)
     order = graph.reached(root for roots, *_ in functions.values() for root in roots)
     place = {number: k for k, number in enumerate(order)}
-    codes: dict[str, int] = {}
+    codes = {"INPUT": 0, "CONST": 1}
     numbers: dict[str, int] = {}
     rows = []
     for k, number in enumerate(order):
         kind, *inside = graph.nodes[number]
+        code = codes.setdefault(kind, len(codes))
         if kind == "INPUT":
-            rows.append((0, graph.arrays.index(inside[0]), inside[1]))
+            rows.append((code, graph.arrays.index(inside[0]), inside[1]))
         elif kind == "CONST":
-            rows.append((1, numbers.setdefault(number_text(inside[0]), len(numbers)), 0))
+            rows.append((code, numbers.setdefault(number_text(inside[0]), len(numbers)), 0))
         else:
             back = [k - place[i] for i in inside]
-            rows.append((codes.setdefault(kind, len(codes) + 2), back[0], back[-1]))
+            rows.append((code, back[0], back[-1]))
     results: list[int] = []
     calls = []
     for name, (roots, first, last) in functions.items():
         body = f"  gt_played(a, r, w, {first}, {last}, {len(results)}, {len(roots)});"
         calls.append(_whole(name, graph, [body]))
         results += [place[root] for root in roots]
-    operations = [_operation(name) for name in codes]
-    word = "short" if max(len(rows), *(number for row in rows for number in row)) < 1 << 16 else "int"
+    operations = [_operation(name) for name in list(codes)[2:]]
+    word = "short" if max([len(rows), *(number for row in rows for number in row)]) < 1 << 16 else "int"
     lines = [
         *(operation.code for operation in operations),
         f"#define GT_ROWS {len(rows)}",
         f"#define GT_FIRST_SEED {graph.arrays.index('dt')}",
         f"typedef unsigned {word} gt_word;",
-        f"static const gt_word gt_rows[][3] = {{{', '.join(map(_braced, rows))}}};",
-        f"static const gt_word gt_results[] = {{{', '.join(map(str, results))}}};",
+        f"static const gt_word gt_rows[][3] = {{{', '.join(map(_braced, rows)) or '{0}'}}};",
+        f"static const gt_word gt_results[] = {{{', '.join(map(str, results)) or '0'}}};",
         f"static const double gt_row_numbers[] = {{{', '.join(numbers) or '0'}}};",
         f"static void (*const gt_operations[])({PARAMETERS}) = {{{', '.join(o.name for o in operations) or '0'}}};",
         '#include "tape.c"',

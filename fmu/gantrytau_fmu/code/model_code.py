@@ -34,10 +34,9 @@ def model_code(
 ) -> ModelCode:
     """The text of model.c."""
     graph, formulas = model.graph, model.formulas
-    other = {f"{n}_careful": found for n, found in model.taped.items()}
-    pieces = [c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True), tape(graph, other)]
+    pieces = [c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True), tape(graph, model.taped)]
     for n, roots in model.roots.items():
-        by_value = n in model.careful or n in model.taped
+        by_value = n in model.careful or f"{n}_careful" in model.taped
         pieces += _by_value(model, n, roots) if by_value else [_function(graph, n, roots)]
     defines = dict(
         GT_NAME=_quoted(name),

@@ -1,6 +1,6 @@
 """All formulas of an FMU in one graph, by the C functions that they become."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -17,7 +17,6 @@ SELDOM = {  # small code is worth more than fast one
     "gt_starts",
     "gt_initial",
     "gt_forward",
-    "gt_by_parameters",
     "gt_initial_slopes",
     "gt_pivots",
     "gt_jump",
@@ -32,8 +31,8 @@ class ModelGraph:
     """The graph, and its nodes that are the results of each function.
 
     outputs: the expressions that differ; places: name of an output -> place among them; careful: the results of functions
-    that take other pivots where `trusted` is not 1; taped: the same of functions that hardly anything calls, with the first
-    array and the last, excluded, along which changes are asked for.
+    that take other pivots where `trusted` is not 1; taped: results of functions that hardly anything calls, by their full
+    names, with the first array and the last, excluded, along which changes are asked for.
     """
 
     formulas: Formulas
@@ -66,27 +65,29 @@ def entered(formulas: Formulas) -> ModelGraph:
     roots = {name: graph.enter(name, symbols, expression) for name, expression in functions.items()}
     solving = [name for name in functions if name == "gt_rates" or name.startswith("gt_residual_")]
     roots["gt_pivots"] = graph.divisors(root for name in solving for root in roots[name])
-    careful, taped, trusted = {}, {}, None
+    careful, taped, trusted, everything = {}, {}, None, [*solving, "gt_outputs"]
+    found = roots
     if formulas.careful is not None:
         other = _symbols(formulas.careful)
         wanted = column([formulas.careful.outputs[name] for name in first.values()])
         functions = _functions(formulas.careful, other, wanted)
         found = {name: graph.enter(name, other, expression) for name, expression in functions.items()}
-        differing = {name for name in found if found[name] != roots[name]}
-        careful = {name: found[name] for name in found if name in differing and not is_seldom(name)}
-        taped = {name: (found[name], 0, 0) for name in found if name in differing and is_seldom(name)}
-        everything = [*solving, "gt_outputs"]
-        for name, (names, begin, end) in {
-            "gt_forward": (everything, 0, 4),
-            "gt_by_parameters": (everything, 4, 5),
-            "gt_initial_slopes": (["gt_initial"], 0, 5),
-        }.items():
-            if differing & set(names):
-                taped[name] = ([root for own in names for root in found[own]], begin, end)
+        differing = [name for name in found if found[name] != roots[name]]
+        careful = {name: found[name] for name in differing if not is_seldom(name)}
+        taped = {f"{name}_careful": (found[name], 0, 0) for name in differing if is_seldom(name)}
+        if set(everything) & set(differing):
+            taped["gt_forward_careful"] = (_together(found, everything), 0, 4)
+        if "gt_initial" in differing:
+            taped["gt_initial_slopes_careful"] = (found["gt_initial"], 0, 5)
         holds = [margin > 0 for margin in formulas.margins.elements()]
         (trusted,) = graph.enter("trusted", symbols, reduce(ca.logic_and, holds))
+    taped["gt_by_parameters"] = (_together(found, everything), 4, 5)
     graph.hoist(root for found in (*roots.values(), *careful.values()) for root in found)
     return ModelGraph(formulas, graph, roots, outputs, places, careful, taped, trusted)
+
+
+def _together(roots: Mapping[str, list[int]], names: Sequence[str]) -> list[int]:
+    return [root for name in names for root in roots[name]]
 
 
 def _symbols(formulas: Formulas) -> dict[str, ca.SX]:
@@ -132,11 +133,7 @@ def _changes(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dict[
     everything = column([formulas.rates, formulas.residuals, wanted])
     point, way = [ca.vertcat(*(s[d + name] for name in "txuz")) for d in ("", "d")]
     initial = _along(formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"]))
-    return {
-        "gt_forward": _along(everything, point, way),
-        "gt_by_parameters": _along(everything, s["p"], s["dp"]),
-        "gt_initial_slopes": initial,
-    }
+    return {"gt_forward": _along(everything, point, way), "gt_initial_slopes": initial}
 
 
 def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:

@@ -1,5 +1,5 @@
 /* Functions that hardly anything calls, as rows: an element of an array, a number, or an operation on the rows that stand so
- * many places before. Included by model.c where it has some. */
+ * many places before. Included by model.c. */
 
 static double gt_part(double derivative, double change) {
     return derivative == 0 || change == 0 ? 0 : derivative * change; /* also of infinite ones, as in a branch not taken */
