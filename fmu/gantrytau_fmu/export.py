@@ -30,10 +30,10 @@ from gantrytau_fmu.description import AboutFmu, DefaultExperiment, FmuDescriptio
 SOLVERS = ("dopri5", "rodas4")
 BOTH: tuple[Interfaces, ...] = ("model-exchange", "co-simulation")
 RUNTIME = (
-    "functions.c instance.c linear.c past.c solve.c passages.c values.c derivatives.c turns.c impulses.c history.c "
+    "functions.c tape.c instance.c linear.c past.c solve.c passages.c values.c derivatives.c turns.c impulses.c history.c "
     "initialize.c samples.c events.c state.c {solver}.c step.c calls.c component.c fmi2.c fmi3.c"
 )
-INCLUDED = ("functions.c", "component.c")  # by others
+INCLUDED = ("functions.c", "tape.c", "component.c")  # by others
 HEADERS = ("core.h", "calls.h", "fmi2_types.h", "fmi3_types.h")
 LARGE = 100_000  # operations from which on the compiler is asked for less; its second level gains nothing
 

@@ -2,12 +2,15 @@
 
 An expression that is used once is written where it is used, others get a name. Long functions are cut into pieces
 of bounded length, because compilers need more than proportional time for long straight-line code; what one piece
-computes for another goes through a work array.
+computes for another goes through a work array. What hardly anything calls becomes a table of rows, a tape, which compiles
+at once and is small.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+
+import casadi as ca
 
 from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.operations import OPERATIONS, number_text
@@ -16,6 +19,7 @@ PIECE = 1500  # operations per C function
 LINE = 160  # characters of an expression that is still written where it is used
 REPEATING = {name for name, form in OPERATIONS.items() if form.count("{0}") > 1}
 HOISTED = "c"
+PARAMETERS = "const double *const *a, double *restrict r, double *restrict w"
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +118,68 @@ def _whole(name: str, graph: ExpressionGraph, body: Sequence[str]) -> str:
     text = "".join(body)
     used = [(k, n) for k, n in enumerate([*graph.arrays, HOISTED]) if f"{n}[" in text]
     lines = [
-        f"static void {name}(const double *const *a, double *restrict r, double *restrict w) {{",
+        f"static void {name}({PARAMETERS}) {{",
         *(f"  const double *const {n} = a[{k}];" for k, n in used),
         *body,
         "  (void)a; (void)r; (void)w;" + "".join(f" (void){n};" for _, n in used),
         "}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def tape(graph: ExpressionGraph, functions: Mapping[str, tuple[Sequence[int], int, int]]) -> CFunction:
+    """The functions that runtime/tape.c follows row by row.
+
+    functions: by name the roots, and from which array to before which the results are their changes along the seeds;
+    none of the arrays for the values of the roots.
+    """
+    order = graph.reached(root for roots, *_ in functions.values() for root in roots)
+    place = {number: k for k, number in enumerate(order)}
+    codes = {"INPUT": 0, "CONST": 1}
+    numbers: dict[str, int] = {}
+    rows = []
+    for k, number in enumerate(order):
+        kind, *inside = graph.nodes[number]
+        code = codes.setdefault(kind, len(codes))
+        if kind == "INPUT":
+            rows.append((code, graph.arrays.index(inside[0]), inside[1]))
+        elif kind == "CONST":
+            rows.append((code, numbers.setdefault(number_text(inside[0]), len(numbers)), 0))
+        else:
+            back = [k - place[i] for i in inside]
+            rows.append((code, back[0], back[-1]))
+    results: list[int] = []
+    calls = []
+    for name, (roots, first, last) in functions.items():
+        body = f"  gt_played(a, r, w, {first}, {last}, {len(results)}, {len(roots)});"
+        calls.append(_whole(name, graph, [body]))
+        results += [place[root] for root in roots]
+    operations = [_operation(name) for name in list(codes)[2:]]
+    word = "short" if max([len(rows), *(number for row in rows for number in row)]) < 1 << 16 else "int"
+    lines = [
+        *(operation.code for operation in operations),
+        f"#define GT_ROWS {len(rows)}",
+        f"#define GT_FIRST_SEED {graph.arrays.index('dt')}",
+        f"typedef unsigned {word} gt_word;",
+        f"static const gt_word gt_rows[][3] = {{{', '.join(map(_braced, rows)) or '{0}'}}};",
+        f"static const gt_word gt_results[] = {{{', '.join(map(str, results)) or '0'}}};",
+        f"static const double gt_row_numbers[] = {{{', '.join(numbers) or '0'}}};",
+        f"static void (*const gt_operations[])({PARAMETERS}) = {{{', '.join(o.name for o in operations) or '0'}}};",
+        '#include "tape.c"',
+        *calls,
+    ]
+    return CFunction("gt_play", "\n".join(lines) + "\n", 2 * len(rows), 0)
+
+
+def _braced(row: tuple[int, int, int]) -> str:
+    return "{" + ",".join(map(str, row)) + "}"
+
+
+def _operation(name: str) -> CFunction:
+    """One operation: its value and its derivatives by its operands, a[0]."""
+    operands, code = ca.SX.sym("x", 2), getattr(ca, f"OP_{name}")
+    x, y = operands.elements()
+    value = ca.SX.binary(code, x, y) if "{1}" in OPERATIONS[name] else ca.SX.unary(code, x)
+    graph = ExpressionGraph(("x",))
+    roots = graph.enter(name, {"x": operands}, ca.vertcat(value, ca.jacobian(value, operands).T))
+    return c_function(graph, f"gt_of_{name.lower()}", roots)

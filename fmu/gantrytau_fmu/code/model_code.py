@@ -6,26 +6,13 @@ from dataclasses import dataclass
 import casadi as ca
 
 from gantrytau_fmu.code.arrays import numbers_of
-from gantrytau_fmu.code.c_functions import CFunction, c_function
+from gantrytau_fmu.code.c_functions import PARAMETERS, CFunction, c_function, tape
 from gantrytau_fmu.code.contents import Contents
 from gantrytau_fmu.code.expressions import ExpressionGraph
 from gantrytau_fmu.code.formulas import Formulas
 from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas
-from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph
+from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph, is_seldom
 from gantrytau_fmu.code.operations import number_text
-
-SELDOM = {  # small code is worth more than fast one
-    "gt_outputs",
-    "gt_starts",
-    "gt_initial",
-    "gt_forward",
-    "gt_by_parameters",
-    "gt_initial_slopes",
-    "gt_pivots",
-    "gt_jump",
-    "gt_symbols",
-    "gt_impulses",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +34,10 @@ def model_code(
 ) -> ModelCode:
     """The text of model.c."""
     graph, formulas = model.graph, model.formulas
-    pieces = [c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True)]
+    pieces = [c_function(graph, "gt_fill", list(graph.hoisted), hoisting=True), tape(graph, model.taped)]
     for n, roots in model.roots.items():
-        pieces += _by_value(model, n, roots) if n in model.careful else [_function(graph, n, roots)]
+        by_value = n in model.careful or f"{n}_careful" in model.taped
+        pieces += _by_value(model, n, roots) if by_value else [_function(graph, n, roots)]
     defines = dict(
         GT_NAME=_quoted(name),
         GT_TOKEN=_quoted(token),
@@ -77,22 +65,25 @@ def _function(graph: ExpressionGraph, name: str, roots: Sequence[int]) -> CFunct
 
 
 def _mark(name: str) -> str:
-    return "GT_SELDOM " if name in SELDOM or name.startswith("gt_level_") else ""
+    return "GT_SELDOM " if is_seldom(name) else ""
 
 
 def _by_value(model: ModelGraph, name: str, roots: Sequence[int]) -> list[CFunction]:
     """A function that is computed with the pivots of the closed forms, and anew with others where these are small."""
     assert model.trusted is not None
     quick = c_function(model.graph, f"{name}_quick", roots, mark=_mark(name), flag=model.trusted)
-    mark = "GT_RARELY " if name in SELDOM else "GT_SELDOM "
-    careful = c_function(model.graph, f"{name}_careful", model.careful[name], mark=mark)
+    careful = [
+        c_function(model.graph, f"{name}_careful", roots, mark="GT_SELDOM ")
+        for roots in (model.careful.get(name),)
+        if roots
+    ]
     lines = [
-        f"static void {name}(const double *const *a, double *restrict r, double *restrict w) {{",
+        f"static void {name}({PARAMETERS}) {{",
         f"  {name}_quick(a, r, w);",
         f"  if (!(w[GT_TRUSTED] > 0)) {name}_careful(a, r, w);",
         "}",
     ]
-    return [quick, careful, CFunction(name, "\n".join(lines) + "\n", 0, 0)]
+    return [quick, *careful, CFunction(name, "\n".join(lines) + "\n", 0, 0)]
 
 
 def _moving(model: ModelGraph) -> list[str]:
@@ -190,8 +181,8 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _texts("gt_clock_names", [formulas.held[k] for k in held]),
         *(_of_impulses(formulas.impulses) if formulas.impulses.by_level else []),
         "typedef struct {",
-        "  void (*residual)(const double *const *a, double *restrict r, double *restrict w);",
-        "  void (*jacobian)(const double *const *a, double *restrict r, double *restrict w);",
+        f"  void (*residual)({PARAMETERS});",
+        f"  void (*jacobian)({PARAMETERS});",
         "  int first, count, matrix, linear, frictions;",
         "} gt_block;",
     ]
@@ -209,7 +200,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
 def _of_impulses(impulses: ImpulseFormulas) -> list[str]:
     levels = ", ".join(f"gt_level_{k}" for k in range(1, len(impulses.by_level) + 1))
     return [
-        f"static void (*const gt_levels[])(const double *const *a, double *restrict r, double *restrict w) = {{{levels}}};",
+        f"static void (*const gt_levels[])({PARAMETERS}) = {{{levels}}};",
         _texts("gt_unknown_names", impulses.levels.unknowns),
         _integers("gt_unknown_orders", impulses.levels.orders),
         _integers("gt_equation_counts", impulses.levels.counts),

@@ -1,6 +1,6 @@
 """All formulas of an FMU in one graph, by the C functions that they become."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -12,6 +12,17 @@ from gantrytau_fmu.code.formulas import Formulas
 
 SEEDS = ("dt", "dx", "du", "dz", "dp")
 OF_DELAYS = ("gt_past", "gt_past_rates", "gt_delay_times")
+SELDOM = {  # small code is worth more than fast one
+    "gt_outputs",
+    "gt_starts",
+    "gt_initial",
+    "gt_forward",
+    "gt_initial_slopes",
+    "gt_pivots",
+    "gt_jump",
+    "gt_symbols",
+    "gt_impulses",
+}
 ARRAYS = ("t", "x", "u", "z", "p", "m", "e", *SEEDS, "y", "j")
 
 
@@ -20,7 +31,8 @@ class ModelGraph:
     """The graph, and its nodes that are the results of each function.
 
     outputs: the expressions that differ; places: name of an output -> place among them; careful: the results of functions
-    that take other pivots where `trusted` is not 1.
+    that take other pivots where `trusted` is not 1; taped: results of functions that hardly anything calls, by their full
+    names, with the first array and the last, excluded, along which changes are asked for.
     """
 
     formulas: Formulas
@@ -29,7 +41,13 @@ class ModelGraph:
     outputs: tuple[ca.SX, ...]
     places: Mapping[str, int]
     careful: Mapping[str, list[int]]
+    taped: Mapping[str, tuple[list[int], int, int]]
     trusted: int | None
+
+
+def is_seldom(name: str) -> bool:
+    """Whether small code is worth more than fast one."""
+    return name in SELDOM or name.startswith("gt_level_")
 
 
 def entered(formulas: Formulas) -> ModelGraph:
@@ -43,21 +61,33 @@ def entered(formulas: Formulas) -> ModelGraph:
     place = {root: k for k, root in enumerate(first)}
     outputs = tuple(formulas.outputs[name] for name in first.values())
     places = {name: place[root] for name, root in zip(formulas.outputs, found, strict=True)}
-    functions = _functions(formulas, symbols, column(outputs))
+    functions = _functions(formulas, symbols, column(outputs)) | _changes(formulas, symbols, column(outputs))
     roots = {name: graph.enter(name, symbols, expression) for name, expression in functions.items()}
     solving = [name for name in functions if name == "gt_rates" or name.startswith("gt_residual_")]
     roots["gt_pivots"] = graph.divisors(root for name in solving for root in roots[name])
-    careful, trusted = {}, None
+    careful, taped, trusted, everything = {}, {}, None, [*solving, "gt_outputs"]
+    found = roots
     if formulas.careful is not None:
         other = _symbols(formulas.careful)
         wanted = column([formulas.careful.outputs[name] for name in first.values()])
         functions = _functions(formulas.careful, other, wanted)
-        careful = {name: graph.enter(name, other, expression) for name, expression in functions.items()}
-        careful = {name: found for name, found in careful.items() if found != roots[name]}
+        found = {name: graph.enter(name, other, expression) for name, expression in functions.items()}
+        differing = [name for name in found if found[name] != roots[name]]
+        careful = {name: found[name] for name in differing if not is_seldom(name)}
+        taped = {f"{name}_careful": (found[name], 0, 0) for name in differing if is_seldom(name)}
+        if set(everything) & set(differing):
+            taped["gt_forward_careful"] = (_together(found, everything), 0, 4)
+        if "gt_initial" in differing:
+            taped["gt_initial_slopes_careful"] = (found["gt_initial"], 0, 5)
         holds = [margin > 0 for margin in formulas.margins.elements()]
         (trusted,) = graph.enter("trusted", symbols, reduce(ca.logic_and, holds))
+    taped["gt_by_parameters"] = (_together(found, everything), 4, 5)
     graph.hoist(root for found in (*roots.values(), *careful.values()) for root in found)
-    return ModelGraph(formulas, graph, roots, outputs, places, careful, trusted)
+    return ModelGraph(formulas, graph, roots, outputs, places, careful, taped, trusted)
+
+
+def _together(roots: Mapping[str, list[int]], names: Sequence[str]) -> list[int]:
+    return [root for name in names for root in roots[name]]
 
 
 def _symbols(formulas: Formulas) -> dict[str, ca.SX]:
@@ -68,7 +98,6 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
     """The results of the C functions by their names."""
     point = ca.vertcat(s["t"], s["x"], s["u"], s["z"])
     way = ca.vertcat(s["dt"], s["dx"], s["du"], s["dz"])
-    everything = column([formulas.rates, formulas.residuals, wanted])
     phases = _along(formulas.switching.phases, point, way).elements()
     pace = reduce(ca.fmax, [ca.fabs(rate) for rate in phases], ca.SX(0.0))
     named = {
@@ -87,11 +116,6 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         "gt_delay_times": formulas.delay_times,
         "gt_turning": column([formulas.switching.margins, formulas.switching.noise]),
         "gt_turning_rates": column([_along(formulas.switching.margins, point, way), pace]),
-        "gt_forward": _along(everything, point, way),
-        "gt_by_parameters": _along(everything, s["p"], s["dp"]),
-        "gt_initial_slopes": _along(
-            formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"])
-        ),
     }
     if not formulas.delays:
         named = {name: found for name, found in named.items() if name not in OF_DELAYS}
@@ -102,6 +126,14 @@ def _functions(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dic
         named[f"gt_residual_{k}"] = block.residual
         named[f"gt_jacobian_{k}"] = ca.vec(ca.densify(ca.jacobian(block.residual, block.unknowns)))
     return named
+
+
+def _changes(formulas: Formulas, s: Mapping[str, ca.SX], wanted: ca.SX) -> dict[str, ca.SX]:
+    """The C functions of changes along the seeds, by their names."""
+    everything = column([formulas.rates, formulas.residuals, wanted])
+    point, way = [ca.vertcat(*(s[d + name] for name in "txuz")) for d in ("", "d")]
+    initial = _along(formulas.starts.equations, ca.vertcat(point, s["p"]), ca.vertcat(way, s["dp"]))
+    return {"gt_forward": _along(everything, point, way), "gt_initial_slopes": initial}
 
 
 def _along(expression: ca.SX, point: ca.SX, way: ca.SX) -> ca.SX:

@@ -85,16 +85,11 @@ static size_t gt_state_size(const gt_instance *it);
 static void gt_save(const gt_instance *it, void *block);
 static gt_status gt_restore(gt_instance *it, const char *function, const void *block, size_t size);
 
-/* GT_SELDOM: compiled for size, and not into what is not; GT_RARELY: compiled soon, for hardly anything calls it */
-#if defined __clang__
+/* GT_SELDOM: compiled for size, and not into what is not */
+#if defined __GNUC__
 #define GT_SELDOM __attribute__((cold, noinline))
-#define GT_RARELY __attribute__((cold, noinline, optnone))
-#elif defined __GNUC__
-#define GT_SELDOM __attribute__((cold, noinline))
-#define GT_RARELY __attribute__((cold, noinline, optimize("O0")))
 #else
 #define GT_SELDOM
-#define GT_RARELY
 #endif
 
 /* ---- model.c, generated: tables and functions; see the end of instance.h */
