@@ -1,6 +1,7 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from gantrytau.border.refusal import ModelError
@@ -25,12 +26,21 @@ TAKEN = {
 }
 
 
-class _FromText(Declared):
+class TextClass(Declared):
     """What classes of Modelica text have in common. structure: of an instance without modifications."""
 
     structure: ClassVar[Structure]
     first_index = 1
     checks_units = False
+
+    def __init__(self, defaults: Mapping[str, Any] | None = None, /, **modifications: Any):
+        super().__init__(defaults, **modifications)
+        self.__class__ = type(self).shaped(self.modifications)
+
+    def modified(self, modifications: Mapping[str, Any], starts: Iterable[str] | None = None) -> Self:
+        found = super().modified(modifications, starts)
+        found.__class__ = type(found).shaped(found.modifications)
+        return found
 
     @classmethod
     def shaped(cls, modifications: Mapping[str, Any]) -> type[Self]:
@@ -43,7 +53,7 @@ class _FromText(Declared):
         return class_of(above, cls)
 
 
-class ModelicaModel(_FromText, Model):
+class ModelicaModel(TextClass, Model):
     """A model, block or record of Modelica text."""
 
     def equations(self) -> Iterator[Any]:
@@ -53,7 +63,7 @@ class ModelicaModel(_FromText, Model):
         yield from _sections(self, "initial equation")
 
 
-class ModelicaConnector(_FromText, Connector):
+class ModelicaConnector(TextClass, Connector):
     """A connector of Modelica text."""
 
 
@@ -87,7 +97,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     scope = structure.scope
     _refuse_kind(structure)
     body: dict[str, Any] = {
-        "__module__": __name__,
+        "__module__": Path(scope.source.name).name,
         "structure": structure,
         "__doc__": scope.definition.description,
     }

@@ -68,6 +68,11 @@ class ModelicaLibrary:
         kinds = ("model", "block", "connector", "record", "class")
         return tuple(sorted(one.name for one in left if one.definition.kind in kinds))
 
+    def kind_of(self, name: str) -> str:
+        """The word before the name of a class: model, block, connector, ...; "" for a partial one."""
+        definition = self.root.find_class(name, 0).definition
+        return "" if "partial" in definition.prefixes else definition.kind
+
     def __getitem__(self, name: str) -> type[Any]:
         """The class of that full name; ModelError where there is none, or it cannot be made."""
         if name not in self._classes:
