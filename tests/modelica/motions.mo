@@ -5,9 +5,13 @@ package Motions "models of one class each"
   model Pendulum "in Cartesian coordinates"
     parameter Real L(unit = "m", min = 0) = 0.5, m(unit = "kg") = 1;
     parameter Side side = Side.right;
-    Real r[2](each unit = "m", start = {if side == Side.right then 0.3 else -0.3, -0.4}, fixed = {true, false});
-    Real v[2](each unit = "m/s", start = {0, 0}, fixed = {true, false});
+    parameter Real x0(unit = "m") = if side == Side.right then 0.3 else -0.3;
+    Real r[2](each unit = "m", start = {x0, -0.4});
+    Real v[2](each unit = "m/s", start = {0, 0});
     Real f(unit = "N/m") "force of the rod for a length";
+  initial equation
+    r[1] = x0;
+    v[1] = 0;
   equation
     v = der(r);
     m * der(v) = {0, -m * g} - f * r;

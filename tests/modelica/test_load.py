@@ -230,3 +230,34 @@ def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):
     (tmp_path / "use.mo").write_text("model Use\n extends Lib.Parts.Lag(x(start=2));\nend Use;")
     use = load_modelica(tmp_path / "use.mo", libraries=[tmp_path])["Use"]
     assert simulate(use(), stop=1.0)["x"][-1] == pytest.approx(2 * np.exp(-3), rel=1e-7)
+
+
+class Controlled(Model):
+    x = Real(start=0.0, fixed=True)
+
+    def equations(self):
+        yield der(self.x) == gantrytau.limit(1.5 * (1 - self.x), -0.5, 0.5) + 0.1
+
+
+class Quadratic(Model):
+    x = Real(start=0.0, fixed=True)
+
+    def equations(self):
+        yield der(self.x) == 2 * (1 - self.x) ** 2 + 0.1
+
+
+def test_functions_records_and_redeclared_models_compute_as_python_does():
+    whole = load_modelica(HERE / "functions.mo")["Functions.Whole"]
+    same(whole(), Controlled(), {"plain.x": "x"}, 1.0)
+    same(whole(), Quadratic(), {"other.x": "x"}, 1.0)
+    result = simulate(whole())
+    x, t = result["plain.x"], result.time
+    polynomial = 1 + 2 * x + 3 * x**2
+    np.testing.assert_allclose(result["plain.y"][x < 0.49], -polynomial[x < 0.49], rtol=1e-12)
+    np.testing.assert_allclose(result["plain.y"][x > 0.51], polynomial[x > 0.51], rtol=1e-12)
+    np.testing.assert_allclose(result["z[3]"], 2 + 3 * t + 3, rtol=1e-12)
+    np.testing.assert_allclose(result["w"], np.minimum(20 * t, 10), rtol=1e-12)
+    assert (result["beyond"][0], result["beyond"][-1]) == (0, 1)
+    again = simulate(whole(around=dict(wind=0.0)))
+    assert again["plain.x"][-1] < x[-1]
+    assert simulate(whole(), parameters={"g.limits": [-0.5, 0.6]})["plain.x"][-1] > x[-1]

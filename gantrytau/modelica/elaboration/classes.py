@@ -8,6 +8,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
 from gantrytau.language.model import Connector, Declared, Model, Outer
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
@@ -57,10 +58,10 @@ class ModelicaModel(TextClass, Model):
     """A model, block or record of Modelica text."""
 
     def equations(self) -> Iterator[Any]:
-        yield from _sections(self, "equation")
+        yield from _sections(self, initial=False)
 
     def initial_equations(self) -> Iterator[Any]:
-        yield from _sections(self, "initial equation")
+        yield from _sections(self, initial=True)
 
 
 class ModelicaConnector(TextClass, Connector):
@@ -233,21 +234,14 @@ def experiment_of(structure: Structure) -> dict[str, float]:
     return {}
 
 
-def _sections(instance: Any, kind: str) -> Iterator[Any]:
-    """The statements of the sections of one kind."""
+def _sections(instance: Any, initial: bool) -> Iterator[Any]:
+    """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
     for section in structure.scope.sections:
-        if section.kind == kind:
-            try:
-                yield from stated(
-                    section.items, structure.interpreter(section.scope, PlacedMembers(instance))
-                )
-            except AbsentComponent as error:
-                raise ModelError(
-                    f"found {error} in an equation, expected a component that is there"
-                ) from None
-        elif section.kind not in ("equation", "initial equation"):
-            section.scope.refuse(
-                section.items[0].at,
-                f"found '{section.kind}' in a model, which is not supported; write equations",
-            )
+        if section.kind.startswith("initial") != initial:
+            continue
+        read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
+        try:
+            yield from read(section.items, structure.interpreter(section.scope, PlacedMembers(instance)))
+        except AbsentComponent as error:
+            raise ModelError(f"found {error} in an equation, expected a component that is there") from None

@@ -176,6 +176,8 @@ class Interpreter:
         (first, subscripts), *rest = e.parts
         if first in self.local:
             found = self.local[first]
+            if found is None:
+                raise ModelError(f"found '{first}', which has no value yet, expected one before it is used")
         elif self.members.has(first):
             found = self.members.member(first)
         elif first == "time" and not rest:
@@ -303,7 +305,7 @@ class Interpreter:
         named = {key: inner.value(one) for key, one in e.named}
         if found is None and name == "pure":
             return arguments[0]
-        if found is None and "." not in name:
+        if "." not in name and (found is None or found.predefined):
             return values.called(name, arguments, named)
         return self.library.call(self.scope.find_class(name, e.at), arguments, named)
 

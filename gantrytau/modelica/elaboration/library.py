@@ -7,6 +7,7 @@ from typing import Any
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.algorithms import called_class
 from gantrytau.modelica.elaboration.classes import class_of
 from gantrytau.modelica.elaboration.modifiers import NOTHING
 from gantrytau.modelica.elaboration.scopes import ClassScope
@@ -102,9 +103,7 @@ class ModelicaLibrary:
 
     def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
         """The value of a function, or of the constructor of a record."""
-        raise ModelError(
-            f"found a call of {scope.name}, which is not supported, expected a function of the language"
-        )
+        return called_class(scope, arguments, named, self, self.package(scope))
 
 
 def load_modelica(

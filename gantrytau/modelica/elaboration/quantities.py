@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from gantrytau.border.dimensions import dimension
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.border.units import known_scale
@@ -83,7 +85,11 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             found[TEXTS[name]] = structure.folded(attribute.seen_from(structure))
         elif name == "fixed":
             value = structure.folded(attribute.seen_from(structure))
-            found[name] = all(value) if hasattr(value, "__len__") else bool(value)
+            each = set(np.ravel(value))
+            if len(each) > 1:
+                words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
+                attribute.scope.refuse(attribute.at, words)
+            found[name] = bool(each.pop())
         elif name == "stateSelect":
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:

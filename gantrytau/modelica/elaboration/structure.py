@@ -45,6 +45,7 @@ class Structure:
     modifier: Modifier
     beyond: Surroundings
     path: str = ""
+    prefixes: frozenset[str] = frozenset()  # parameter or constant, of the record as a whole
     read: set[str] = field(default_factory=set)
     folding: list[str] = field(default_factory=list)
 
@@ -245,7 +246,7 @@ class ClassMember:
         """Words before its type, those of the names of its type among them."""
         bodies = (one.definition.body for one in self.chain)
         found = {word for body in bodies if isinstance(body, tree.ShortClass) for word in body.prefixes}
-        return found | set(self.element.clause.prefixes) | set(self.clause[0].prefixes)
+        return found | {*self.element.clause.prefixes, *self.clause[0].prefixes, *self.owner.prefixes}
 
     @property
     def is_parameter(self) -> bool:
@@ -321,7 +322,8 @@ class ClassMember:
             )
         path = f"{self.owner.path}.{self.name}".lstrip(".")
         said = [self.full.of_element(k) for k in range(self.shape[0])] if self.shape else [self.full]
-        return [Structure(kind, one, self.owner.beyond, path) for one in said]
+        prefixes = frozenset({"parameter", "constant"} & self.prefixes)
+        return [Structure(kind, one, self.owner.beyond, path, prefixes) for one in said]
 
 
 def plain(values: Mapping[str, Any]) -> Modifier:
