@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import Items, looped
 from gantrytau.modelica.elaboration.values import RecordValue
@@ -59,7 +59,7 @@ class Execution:
             reader.scope.refuse(item.at, f"found what does not hold: {reader.value(item.call.arguments[1])}")
 
     def _assign(self, item: tree.Assignment, reader: Interpreter) -> None:
-        value = reader.value(item.value)
+        value = reader.results(item.value)
         found = value if isinstance(value, tuple) else (value,)
         if len(item.targets) > len(found):
             reader.scope.refuse(
@@ -242,7 +242,7 @@ def called_class(
     if missing is not None or not outputs:
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
-    return found if len(found) > 1 else found[0]
+    return found if len(found) > 1 else first_result(found)
 
 
 def _is_open(value: Any) -> bool:
@@ -281,12 +281,7 @@ def _given(
         if name in found:
             raise ModelError(f"found two values for '{name}' of {scope.name}, expected one")
         found[name] = one
-    return {name: first_result(one) for name, one in found.items()}
-
-
-def first_result(value: Any) -> Any:
-    """The first of several results of a function, which is its value in an expression."""
-    return next(iter(value)) if isinstance(value, tuple) else value
+    return found
 
 
 def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:

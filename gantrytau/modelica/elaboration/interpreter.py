@@ -51,6 +51,11 @@ class Surroundings(Protocol):
         ...
 
 
+def first_result(value: Any) -> Any:
+    """The first of several results of a function, which is its value in an expression."""
+    return next(iter(value)) if isinstance(value, tuple) else value
+
+
 @dataclass(frozen=True, eq=False)
 class Interpreter:
     """Evaluates expressions of a class in an instance.
@@ -71,6 +76,10 @@ class Interpreter:
 
     def value(self, expression: Any) -> Any:
         """The value of an expression; ModelError with its line for what has none. A plain value is itself."""
+        return first_result(self.results(expression))
+
+    def results(self, expression: Any) -> Any:
+        """The same; the call of a function with several results has all of them, as a tuple."""
         if not isinstance(expression, tree.TreeNode):
             return expression
         try:
@@ -162,7 +171,7 @@ class Interpreter:
         return list(found)
 
     def _matrix(self, e: tree.Matrix) -> Any:
-        rows = [[np.atleast_1d(self.value(one)) for one in row] for row in e.rows]
+        rows = [[np.atleast_1d(values.boxed(self.value(one))) for one in row] for row in e.rows]
         rows = [[one[:, None] if one.ndim == 1 else one for one in row] for row in rows]
         return np.concatenate([np.concatenate(row, axis=1) for row in rows], axis=0).astype(object)
 

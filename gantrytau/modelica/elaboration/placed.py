@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Formula
@@ -41,6 +42,8 @@ class PlacedMembers:
             raise AbsentComponent(f"{name}, whose condition does not hold")
         if one is not None and one.is_folded:
             return self.structure.member(name) if self.structure else None
+        if one is not None and 0 in one.shape:
+            return np.empty(one.shape, dtype=object) if one.primitive else []
         found = getattr(self.instance, name)
         if isinstance(found, ca.SX):
             return values.from_casadi(found, one.shape) if one is not None else _by_size(found)

@@ -13,7 +13,7 @@ from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
 from gantrytau.modelica.elaboration.scopes import TextError
 
 Items = Sequence[tree.EquationOrStatement]
@@ -68,7 +68,7 @@ def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
 
 def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any, Any]]:
     """The two sides of an equation as the language compares them; several for records and lists of outputs."""
-    right = reader.value(item.right)
+    right = reader.results(item.right)
     if isinstance(item.left, tree.OutputList):
         if not isinstance(right, tuple):
             raise ModelError(
@@ -78,7 +78,7 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
             raise ModelError(f"found {len(item.left.items)} outputs, expected at most {len(right)}")
         pairs = [(reader.value(a), b) for a, b in zip(item.left.items, right, strict=False) if a is not None]
     else:
-        pairs = [(reader.value(item.left), right[0] if isinstance(right, tuple) else right)]
+        pairs = [(reader.value(item.left), first_result(right))]
     for a, b in pairs:
         yield from _pairs(a, b)
 

@@ -250,7 +250,7 @@ class ClassMember:
 
     @property
     def is_parameter(self) -> bool:
-        return bool({"parameter", "constant"} & self.prefixes)
+        return bool({"parameter", "constant"} & self.prefixes) or self.kind == "String"
 
     @property
     def is_folded(self) -> bool:

@@ -121,18 +121,22 @@ def size_words(value: Any) -> str:
     return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
 
 
+def boxed(value: Any) -> Any:
+    """A value as an array of NumPy, a scalar without dimensions; NumPy itself would take a symbol apart."""
+    if isinstance(value, np.ndarray):
+        return value
+    found = np.empty((), dtype=object)
+    found[()] = value
+    return found
+
+
 def _spread(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     """An operation element by element; CasADi and NumPy do not know each other's."""
 
     def apply(a: Any, b: Any) -> Any:
         if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)):
             return operation(a, b)
-        boxes = [a, b]
-        for k, one in enumerate((a, b)):
-            if not isinstance(one, np.ndarray):
-                boxes[k] = np.empty((), dtype=object)
-                boxes[k][()] = one
-        return np.frompyfunc(operation, 2, 1)(*boxes)
+        return np.frompyfunc(operation, 2, 1)(boxed(a), boxed(b))
 
     return apply
 
@@ -254,7 +258,7 @@ def _filled(value: Any, *sizes: int) -> Any:
 
 
 def _cat(axis: int, *parts: Any) -> Any:
-    return np.concatenate([np.atleast_1d(one) for one in parts], axis=axis - 1)
+    return np.concatenate([np.atleast_1d(boxed(one)) for one in parts], axis=axis - 1)
 
 
 def _cross(a: Any, b: Any) -> Any:
@@ -305,8 +309,8 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "cross": _cross,
     "skew": _skew,
     "outerProduct": lambda a, b: a[:, None] * b[None, :],
-    "vector": lambda value: np.ravel(np.atleast_1d(value)),
-    "matrix": lambda value: np.atleast_2d(value) if np.ndim(_shaped(value)) != 1 else value[:, None],
+    "vector": lambda value: np.ravel(boxed(value)),
+    "matrix": lambda value: np.atleast_2d(boxed(value)) if np.ndim(_shaped(value)) != 1 else value[:, None],
     "scalar": lambda value: value.item() if isinstance(value, np.ndarray) else value,
     "cat": _cat,
     "array": lambda *items: array(items),
