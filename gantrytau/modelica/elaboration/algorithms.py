@@ -115,7 +115,7 @@ class Execution:
         tests: list[tuple[Any, Items]] = []
         last: Items = item.otherwise or ()
         for test, items in item.branches:
-            known = reader.value(test)
+            known = values.tested(reader.value(test))
             if isinstance(known, ca.SX):
                 tests.append((known, items))
             elif known:

@@ -106,7 +106,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     for name, one in structure.members.items():
         if name in TAKEN or name.startswith("_"):
             scope.refuse(
-                scope.definition.at,
+                one.element.declaration.at,
                 f"found a component '{name}', a name that is taken, expected another name",
             )
         if not one.present:

@@ -11,7 +11,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean, in_words
 from gantrytau.language.symbols import time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
 
 
@@ -137,7 +137,7 @@ class Interpreter:
         tests: list[tuple[Any, Any]] = []
         otherwise: Any = e.otherwise
         for test, then in e.branches:
-            known = self.value(test)
+            known = values.tested(self.value(test))
             if isinstance(known, ca.SX):
                 tests.append((known, then))
             elif known:
@@ -203,7 +203,7 @@ class Interpreter:
         parts = list(e.parts)
         owner = self.scope.constant(parts[0][0])
         if owner is not None:
-            return self._of_package(owner[0], parts)
+            return self._of_package(*owner, parts)
         here = self.scope.root if parts[0][0] == "" else self.scope
         if parts[0][0] == "":
             parts = parts[1:]
@@ -231,11 +231,12 @@ class Interpreter:
         if name not in found.elements:
             known = literals or [*found.elements, *found.names()]
             raise ModelError(f"found '{name}', which {found.name} does not have{did_you_mean(name, known)}")
-        return self._of_package(found, parts)
+        return self._of_package(found, found.elements[name], parts)
 
-    def _of_package(self, owner: ClassScope, parts: Sequence[Any]) -> tuple[Any, Any, list[Any]]:
-        (name, subscripts), *rest = parts
-        element = owner.elements[name]
+    def _of_package(
+        self, owner: ClassScope, element: Element, parts: Sequence[Any]
+    ) -> tuple[Any, Any, list[Any]]:
+        name, (subscripts, *rest) = element.declaration.name, (parts[0][1], *parts[1:])
         if not {"constant", "parameter"} & set(element.clause.prefixes):
             raise ModelError(
                 f"found '{name}' of {owner.name}, which lies around this class, expected a constant"

@@ -79,10 +79,15 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     for name, attribute in said.inner.items():
         if attribute.value is None or name in IGNORED:
             continue
-        if name in NUMBERS:
+        if name in NUMBERS and not structure.is_fixed(attribute.value):
+            words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
+            attribute.scope.refuse(attribute.at, words)
+        elif name in NUMBERS:
             found[name] = Bound(attribute, structure)
         elif name in TEXTS:
-            found[TEXTS[name]] = structure.folded(attribute.seen_from(structure))
+            found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
+            if not isinstance(text, str):
+                attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name == "fixed":
             value = structure.folded(attribute.seen_from(structure))
             each = set(np.ravel(value))

@@ -240,20 +240,28 @@ class ClassScope:
         found = self.own_class(name)
         return found or next((x for base, _ in self.bases if (x := base.inherited_class(name))), None)
 
+    def imports(self, name: str) -> Iterator[tuple["ClassScope", str, tree.Import]]:
+        """What imports may make of a name: a class, the name in it, and the import; those of single names first."""
+        found = [one for one in self.items if isinstance(one, tree.Import)]
+        for item in sorted(found, key=lambda one: one.names == ("*",)):
+            package, _, last = item.name.rpartition(".")
+            if item.names is not None and (name in item.names or item.names == ("*",)):
+                yield self.root.find_class(item.name, item.at), name, item
+            elif item.names is None and name == (item.alias or last):
+                yield self.root.find_class(package, item.at) if package else self.root, last, item
+
     def imported(self, name: str) -> "ClassScope | None":
-        """What an import makes of a name."""
-        wild: list[tree.Import] = []
-        for item in self.items:
-            if not isinstance(item, tree.Import):
-                continue
-            if item.names == ("*",):
-                wild.append(item)
-            elif item.names is not None and name in item.names:
-                return self.root.find_class(f"{item.name}.{name}", item.at)
-            elif item.names is None and name == (item.alias or item.name.rpartition(".")[2]):
-                return self.root.find_class(item.name, item.at)
-        found = (self.root.find_class(item.name, item.at).inherited_class(name) for item in wild)
-        return next((one for one in found if one is not None), None)
+        """The class that an import makes of a name."""
+        for owner, inner, item in self.imports(name):
+            found = owner.inherited_class(inner)
+            if found is not None:
+                return found
+            if item.names != ("*",) and inner not in owner.elements:
+                self.refuse(
+                    item.at,
+                    f"found '{inner}', which {owner.name} does not have{did_you_mean(inner, owner.names())}",
+                )
+        return None
 
     def first(self, name: str, inherited: bool = True) -> "ClassScope | None":
         """The class that a simple name means here or further out."""
@@ -271,8 +279,9 @@ class ClassScope:
         """The component that a simple name means in a class around this one, and that class."""
         here: ClassScope | None = self
         while here is not None:
-            if name in here.elements:
-                return here, here.elements[name]
+            for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
+                if inner in owner.elements:
+                    return owner, owner.elements[inner]
             here = here.around
         return None
 

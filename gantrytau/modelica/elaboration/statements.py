@@ -142,7 +142,7 @@ def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     tests: list[tuple[Any, Items]] = []
     last: Items = item.otherwise or ()
     for test, items in item.branches:
-        known = reader.value(test)
+        known = values.tested(reader.value(test))
         if isinstance(known, ca.SX):
             tests.append((known, items))
         elif known:

@@ -46,6 +46,7 @@ class Structure:
     beyond: Surroundings
     path: str = ""
     prefixes: frozenset[str] = frozenset()  # parameter or constant, of the record as a whole
+    around: "Structure | None" = None
     read: set[str] = field(default_factory=set)
     folding: list[str] = field(default_factory=list)
 
@@ -115,7 +116,7 @@ class Structure:
         for one in self.members.values():
             one.full  # noqa: B018  (what is final is told here)
             if one.present and one.shape is not None:
-                for child in one.children:
+                for child in one.children if "outer" not in one.prefixes else ():
                     child.prepare()
         for section in self.scope.sections:
             for item in section.items:
@@ -139,24 +140,28 @@ class Structure:
 
     def _ask_names(self, expression: Any, scope: ClassScope, local: frozenset[str]) -> None:
         """Fold the parameters in an expression, unless a variable stands in it, too."""
-        found = [r for r in references(expression) if r.parts[0][0] not in local]
-        if all(self._is_known(r) for r in found):
+        found = [one for one in references(expression) if one.parts[0][0] not in local]
+        if all(map(self._is_known, found)):
             for one in found:
-                self.interpreter(scope).value(one)
+                whole = tuple((name, ()) for name, _ in one.parts)
+                self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
-    def is_fixed(self, expression: tree.Expression) -> bool:
-        return all(self._is_known(one) for one in references(expression))
+    def is_fixed(self, expression: Any) -> bool:
+        return all(map(self._is_known, references(expression)))
 
     def _is_known(self, reference: tree.ComponentReference) -> bool:
-        here: Any = self
-        for name, subscripts in reference.parts:
-            if isinstance(here, list) or subscripts or not here.has(name):
-                return name != "time" and here is self and not self.has(name)
+        """Whether a reference leads to a parameter or constant."""
+        here: Structure = self
+        for name, _ in reference.parts:
+            if not here.has(name):
+                return here is self and name != "time"
             one = here.members[name]
             if one.primitive is not None:
                 return one.is_parameter
-            here = one.children if one.shape else one.children[0]
-        return False
+            if not one.children:
+                break
+            here = one.children[0]
+        return True
 
 
 def references(expression: Any) -> list[tree.ComponentReference]:
@@ -309,6 +314,8 @@ class ClassMember:
         """The structures of its elements, one for a scalar; none for what has no members."""
         if self.primitive is not None:
             return []
+        if (meant := self._inner()) is not None:
+            return meant.children
         clause, scope = self.clause
         if len(self.shape) > 1:
             scope.refuse(
@@ -323,7 +330,23 @@ class ClassMember:
         path = f"{self.owner.path}.{self.name}".lstrip(".")
         said = [self.full.of_element(k) for k in range(self.shape[0])] if self.shape else [self.full]
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
-        return [Structure(kind, one, self.owner.beyond, path, prefixes) for one in said]
+        around = self.owner
+        while around is not None:
+            if around.scope.definition is kind.definition:
+                scope.refuse(
+                    clause.at, f"found a component of {kind.name} within itself, expected another class"
+                )
+            around = around.around
+        return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
+
+    def _inner(self) -> "ClassMember | None":
+        """The component that an `outer` means."""
+        around = self.owner.around if "outer" in self.prefixes and "inner" not in self.prefixes else None
+        while around is not None:
+            if around.has(self.name) and "inner" in around.members[self.name].prefixes:
+                return around.members[self.name]
+            around = around.around
+        return None
 
 
 def plain(values: Mapping[str, Any]) -> Modifier:

@@ -224,7 +224,7 @@ def _elementwise(function: Callable[..., Any]) -> Callable[..., Any]:
     def apply(value: Any) -> Any:
         if isinstance(value, np.ndarray):
             return array([apply(one) for one in value])
-        return function(_numeric("the parenthesis", value))
+        return function(_numeric("(", value))
 
     return apply
 
@@ -343,4 +343,15 @@ def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any
         raise ModelError(f"found {name}(), which is not supported here; {REFUSED[name]}")
     if name not in FUNCTIONS:
         raise ModelError(f"found '{name}(', expected a function{did_you_mean(name, FUNCTIONS)}")
-    return FUNCTIONS[name](*arguments, **named)
+    try:
+        return FUNCTIONS[name](*arguments, **named)
+    except TypeError as error:
+        found = ", ".join([*map(size_words, arguments), *named])
+        raise ModelError(f"found {name}() of ({found}), expected other arguments") from error
+
+
+def tested(value: Any) -> Any:
+    """A condition: true, false, or an expression of symbols; ModelError for what is none."""
+    if isinstance(value, ca.SX) or (isinstance(value, (bool, int, float)) and value in (0, 1)):
+        return value
+    raise ModelError(f"found {value!r} as a condition, expected true or false")
