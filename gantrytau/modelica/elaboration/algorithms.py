@@ -213,7 +213,8 @@ def called_class(
     record = definition.kind == "record"
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
-    if isinstance(definition.body, tree.Composition) and definition.body.external is not None:
+    external = definition.body.external if isinstance(definition.body, tree.Composition) else None
+    if external is not None and external.language != "builtin":
         raise ModelError(
             f"found {scope.name}, an external function, which is not supported; write an algorithm"
         )
@@ -226,6 +227,8 @@ def called_class(
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, constants) for one in all_given]
         return values.array(each)
+    if external is not None:
+        return values.called(external.function or definition.name, [given[n] for n in inputs], {})
     run = Execution(Interpreter(scope, constants, beyond), {})
     for name, element in scope.elements.items():
         run.known[name] = given[name] if name in given else _initial(name, element, run, name in inputs)

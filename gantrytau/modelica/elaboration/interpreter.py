@@ -310,11 +310,14 @@ class Interpreter:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
             return time >= self.members.next_sample(e)
-        found = self.scope.first(name.split(".")[0]) if name not in ("der", "pure", "initial") else None
+        keyword = name in ("der", "pure", "initial")
+        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
+        found = None if keyword else start.first(first.split(".")[0])
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
         if found is None and name == "pure":
             return arguments[0]
+        name = name.removeprefix(".") if found is None or found.predefined else name
         if "." not in name and (found is None or found.predefined):
             return values.called(name, arguments, named)
         return self.library.call(self.scope.find_class(name, e.at), arguments, named)

@@ -109,7 +109,11 @@ class Structure:
             )
         if one.kind == "Real" and isinstance(found, int) and not isinstance(found, bool):
             return float(found)
-        return found
+        return (
+            int(found)
+            if one.kind == "Integer" and isinstance(found, float) and found == int(found)
+            else found
+        )
 
     def prepare(self) -> None:
         """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""

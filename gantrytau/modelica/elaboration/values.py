@@ -229,6 +229,11 @@ def _elementwise(function: Callable[..., Any]) -> Callable[..., Any]:
     return apply
 
 
+def _of_numbers(plain: Callable[..., Any], symbolic: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that keeps whole numbers whole."""
+    return lambda *values: (plain if all(map(is_number, values)) else symbolic)(*values)
+
+
 def _reduced(function: Callable[[Any, Any], Any], start: Any) -> Callable[..., Any]:
     def apply(*values: Any) -> Any:
         if len(values) == 1:
@@ -277,6 +282,12 @@ def _truncated(x: Any) -> Any:
     return if_else(x >= 0, ca.floor(x), ca.ceil(x)) if isinstance(x, ca.SX) else int(x)
 
 
+def _written(value: Any, *_: Any, **__: Any) -> str:
+    if isinstance(value, EnumerationValue):
+        return value.literal
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def _differentiated(x: Any) -> Any:
     return der(x) if isinstance(x, ca.SX) else 0.0
 
@@ -285,16 +296,16 @@ PLAIN = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "e
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     **{name: _elementwise(getattr(ca, name)) for name in PLAIN},
     "log10": _elementwise(ca.log10),
-    "abs": _elementwise(ca.fabs),
+    "abs": _elementwise(_of_numbers(abs, ca.fabs)),
     "floor": _elementwise(ca.floor),
     "ceil": _elementwise(ca.ceil),
     "integer": _elementwise(lambda x: ca.floor(x) if isinstance(x, ca.SX) else int(np.floor(x))),
     "atan2": ca.atan2,
-    "mod": mod,
+    "mod": _of_numbers(operator.mod, mod),
     "div": lambda x, y: _truncated(x / y),
     "rem": lambda x, y: x - y * _truncated(x / y),
-    "min": _reduced(fmin, np.inf),
-    "max": _reduced(fmax, -np.inf),
+    "min": _reduced(_of_numbers(min, fmin), np.inf),
+    "max": _reduced(_of_numbers(max, fmax), -np.inf),
     "sum": _reduced(operator.add, 0),
     "product": _reduced(operator.mul, 1),
     "size": _size,
@@ -324,6 +335,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "noEvent": lambda value: value,
     "semiLinear": lambda x, above, below: if_else(x >= 0, above * x, below * x),
     "Integer": int,
+    "String": _written,
 }  # fmt: skip
 REFUSED: Mapping[str, str] = {
     "inStream": "write a connector with flow and potential variables",
@@ -332,7 +344,6 @@ REFUSED: Mapping[str, str] = {
     "cardinality": "give a Boolean parameter that says whether something is connected",
     "terminal": "leave out what is done at the end",
     "getInstanceName": "write the text itself",
-    "String": "write the text itself",
     "initial": "write an initial equation, or a start value",
 }
 
