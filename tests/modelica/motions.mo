@@ -55,4 +55,15 @@ package Motions "models of one class each"
       assert(false, "it is locked");
     end if;
   end Sampled;
+
+  model Thermostat "a switch with hysteresis"
+    parameter Real low = 0.4, high = 0.6;
+    Boolean on;
+    Real T(start = 0.5, fixed = true);
+  initial equation
+    pre(on) = true;
+  equation
+    on = pre(on) and T < high or T < low;
+    der(T) = if on then 1 else -1;
+  end Thermostat;
 end Motions;

@@ -146,6 +146,13 @@ def test_a_sampled_variable_changes_at_its_instants(motions):
         simulate(motions["Motions.Sampled"](T=-1.0), stop=1)
 
 
+def test_a_switch_with_hysteresis_swings_between_its_limits(motions):
+    result = simulate(motions["Motions.Thermostat"](), stop=1.0)
+    times = np.array([0.05, 0.2, 0.35, 0.45, 0.6])
+    np.testing.assert_allclose(result.at(times, "T"), [0.55, 0.5, 0.45, 0.55, 0.5], atol=1e-9)
+    np.testing.assert_array_equal(result.at(times, "on"), [1, 0, 1, 1, 0])
+
+
 def test_an_assertion_that_fails_on_the_way_ends_the_run(motions):
     with pytest.raises(SolveError, match="x runs away"):
         simulate(motions["Motions.Sampled"](x=Fixed(4.9), u=gantrytau.Start(30.0)), stop=1)

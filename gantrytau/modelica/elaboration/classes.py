@@ -1,6 +1,6 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -12,7 +12,13 @@ from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.statements import AbsentComponent, sample_calls, stated
+from gantrytau.modelica.elaboration.statements import (
+    AbsentComponent,
+    first_valued,
+    remembers,
+    sample_calls,
+    stated,
+)
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
 
 TAKEN = {
@@ -103,6 +109,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         "__doc__": scope.definition.description,
     }
     held = set(_held(structure))
+    before = dict(_first_values(structure, held))
     for name, one in structure.members.items():
         if name in TAKEN or name.startswith("_"):
             scope.refuse(
@@ -114,7 +121,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         elif "outer" in one.prefixes and "inner" not in one.prefixes:
             body[name] = Outer(Declared, name)
         elif one.primitive is not None:
-            add_quantity(body, one, name in held)
+            add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
@@ -151,8 +158,23 @@ def _refuse_kind(structure: Structure) -> None:
         )
 
 
+def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Modifier]]:
+    """Names and values of the initial equations of what a `when` sets, as `pre(x) = 1` or `x = 1`."""
+    for section in structure.scope.sections:
+        for item in section.items if section.kind == "initial equation" else ():
+            name = first_valued(item)
+            if name in held and isinstance(item, tree.SimpleEquation):
+                structure.started.append(item)
+                yield name, Modifier(item.right, section.scope, at=item.at)
+
+
 def _held(structure: Structure) -> Iterator[str]:
     """Names of what a `when` sets."""
+    for section in structure.scope.sections:
+        switches = [item for item in section.items if section.kind == "equation" and remembers(item)]
+        yield from (
+            item.left.parts[0][0] for item in switches if isinstance(item.left, tree.ComponentReference)
+        )
     for item in _whens(structure):
         for _, items in item.branches:
             left = list(items)
@@ -241,7 +263,8 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         if section.kind.startswith("initial") != initial:
             continue
         read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
+        items = [one for one in section.items if not any(one is other for other in structure.started)]
         try:
-            yield from read(section.items, structure.interpreter(section.scope, PlacedMembers(instance)))
+            yield from read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
         except AbsentComponent as error:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None

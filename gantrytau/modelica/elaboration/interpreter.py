@@ -30,6 +30,10 @@ class Members(Protocol):
         """Names of its components."""
         ...
 
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        """The sizes of a component; None where only its value has them."""
+        ...
+
     def next_sample(self, call: tree.Call) -> Any:
         """The next instant of a `sample`."""
         ...
@@ -306,6 +310,8 @@ class Interpreter:
             if name == "array":
                 return values.array(items)
             return values.called(name, [np.ravel(values.array(items))], {})
+        if name == "size" and e.arguments and (shape := self._declared_shape(e.arguments[0])) is not None:
+            return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
@@ -321,6 +327,15 @@ class Interpreter:
         if "." not in name and (found is None or found.predefined):
             return values.called(name, arguments, named)
         return self.library.call(self.scope.find_class(name, e.at), arguments, named)
+
+    def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
+        """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
+        if not isinstance(e, tree.ComponentReference):
+            return None
+        (name, subscripts), *rest = e.parts
+        if rest or subscripts:
+            return None
+        return self.members.shape(name) if name not in self.local and self.members.has(name) else None
 
     def _partial(self, e: tree.PartialCall) -> Any:
         raise ModelError("found a function as an argument, which is not supported, expected a value")

@@ -17,6 +17,7 @@ from gantrytau.modelica.source import SourceText
 
 PREDEFINED = """
 type Real end Real; type Integer end Integer; type Boolean end Boolean; type String end String;
+partial class ExternalObject end ExternalObject;
 type StateSelect = enumeration(never, avoid, default, prefer, always);
 type AssertionLevel = enumeration(warning, error);
 """
@@ -32,7 +33,8 @@ class ModelicaLibrary:
         self.root = ClassScope(top, SourceText("Modelica", ""), None)
         predefined = parse(SourceText("Modelica", PREDEFINED))
         for one in predefined.classes:
-            self.root.classes[one.name] = ClassScope(one, predefined.source, self.root, predefined=True)
+            made = ClassScope(one, predefined.source, self.root, predefined=one.kind == "type")
+            self.root.classes[one.name] = made
         self.given: list[str] = []
         self._packages: dict[int, Structure] = {}
         self._classes: dict[str, type[Any]] = {}

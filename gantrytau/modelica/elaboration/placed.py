@@ -51,6 +51,9 @@ class PlacedMembers:
             return [PlacedMembers(each) for each in found]
         return PlacedMembers(found) if isinstance(found, Declared) else found
 
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        return self.structure.shape(name) if self.structure else None
+
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 

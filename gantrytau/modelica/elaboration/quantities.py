@@ -28,7 +28,7 @@ TEXTS = {"unit": "unit", "displayUnit": "display"}
 IGNORED = {"quantity", "unbounded"}
 
 
-def add_quantity(body: dict[str, Any], one: ClassMember, held: bool) -> None:
+def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Modifier | None) -> None:
     """The declaration of a number, Boolean, text or enumeration; nothing for a constant that is no plain value."""
     name, structure = one.name, one.owner
     if one.is_folded:
@@ -53,6 +53,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool) -> None:
         return
     if held:
         start = words.pop("start", 0.0)
+        start = Bound(before, structure) if before is not None else start
         words.pop("fixed", None)
         body[name] = Discrete(start, shape=one.shape, **words)
         return

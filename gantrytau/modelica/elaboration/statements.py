@@ -1,7 +1,7 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import casadi as ca
 import numpy as np
@@ -15,6 +15,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
 from gantrytau.modelica.elaboration.scopes import TextError
+from gantrytau.modelica.elaboration.structure import nodes_of
 
 Items = Sequence[tree.EquationOrStatement]
 
@@ -35,7 +36,11 @@ def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
 
 
 def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
-    if isinstance(item, tree.SimpleEquation):
+    if remembers(item):
+        for left, right in sides(item, reader):
+            off = Happening(logic_not(right), (left == 0,), initially=True)
+            yield WhenChain((Happening(right, (left == 1,), initially=True), off))
+    elif isinstance(item, tree.SimpleEquation):
         for left, right in sides(item, reader):
             yield left == right
     elif isinstance(item, tree.ConnectEquation):
@@ -56,6 +61,22 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
         yield from _call(item, reader)
     else:
         raise ModelError("found a statement among equations, expected an equation")
+
+
+def first_valued(item: tree.EquationOrStatement) -> str:
+    """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
+    left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
+    if isinstance(left, tree.Call) and _is_call(left, "pre"):
+        (left,) = left.arguments
+    return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
+
+
+def remembers(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation outside of `when` that asks for values before, as a switch with hysteresis does."""
+    if not isinstance(item, tree.SimpleEquation) or not isinstance(item.left, tree.ComponentReference):
+        return False
+    names = (call.function.parts[0][0] for call in nodes_of(item.right) if isinstance(call, tree.Call))
+    return any(name in ("pre", "edge", "change") for name in names)
 
 
 def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:

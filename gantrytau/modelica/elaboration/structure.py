@@ -3,7 +3,7 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -38,7 +38,8 @@ def picked(value: Any, path: Sequence[int | str]) -> Any:
 class Structure:
     """An instance of a class: modifier says what is said of it from outside, whose values know their own instances.
 
-    read: names of the parameters that shape it; folding: those whose values are asked for at the moment.
+    read: names of the parameters that shape it; folding: those whose values are asked for at the moment;
+    started: initial equations that are start values of what a `when` sets.
     """
 
     scope: ClassScope
@@ -49,6 +50,7 @@ class Structure:
     around: "Structure | None" = None
     read: set[str] = field(default_factory=set)
     folding: list[str] = field(default_factory=list)
+    started: list[Any] = field(default_factory=list)
 
     @cached_property
     def members(self) -> dict[str, "ClassMember"]:
@@ -67,6 +69,9 @@ class Structure:
 
     def names(self) -> Sequence[str]:
         return [*self.scope.elements]
+
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        return self.members[name].shape
 
     def next_sample(self, call: tree.Call) -> Any:
         raise ModelError("found sample() outside of a condition of 'when', expected it there")
@@ -168,17 +173,23 @@ class Structure:
         return True
 
 
+def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
+    """An expression and all that is in it; not the names of functions."""
+    if isinstance(expression, tree.Call):
+        yield expression
+        yield from nodes_of((expression.arguments, expression.named))
+    elif isinstance(expression, (tuple, list)):
+        for one in expression:
+            yield from nodes_of(one)
+    elif isinstance(expression, tree.TreeNode):
+        yield expression
+        for name in type(expression).__slots__:
+            yield from nodes_of(getattr(expression, name))
+
+
 def references(expression: Any) -> list[tree.ComponentReference]:
     """The references in an expression, but for names of functions."""
-    if isinstance(expression, tree.ComponentReference):
-        return [expression]
-    if isinstance(expression, tree.Call):
-        return references((expression.arguments, expression.named))
-    if isinstance(expression, (tuple, list)):
-        return [r for one in expression for r in references(one)]
-    if isinstance(expression, tree.TreeNode):
-        return [r for name in type(expression).__slots__ for r in references(getattr(expression, name))]
-    return []
+    return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
 
 
 @dataclass(eq=False)
