@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from gantrytau.language.symbols import der, pre, split_derivative, time
     from gantrytau.language.tables.read_table import read_table
     from gantrytau.language.tables.tables import table
+    from gantrytau.modelica.elaboration.library import ModelicaLibrary, load_modelica
     from gantrytau.results.figures import has_windows
     from gantrytau.results.result import Result
     from gantrytau.simulation.simulate import simulate
@@ -129,6 +130,7 @@ __all__ = [
     "Mode",
     "Model",
     "ModelError",
+    "ModelicaLibrary",
     "Output",
     "Parameter",
     "PidGains",
@@ -177,6 +179,7 @@ __all__ = [
     "in_unit",
     "limit",
     "linearize",
+    "load_modelica",
     "log",
     "logic_and",
     "logic_not",

@@ -15,7 +15,7 @@ from typing import Any
 
 from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean, python_error, user_lines
 
-_PYTHON = re.compile(r"(?P<file>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
+_PYTHON = re.compile(r"(?P<file>.+\.(?:py|mo))(?::(?P<name>.*))?", re.DOTALL)
 _URDF = re.compile(r"(?P<file>.+\.urdf)(?P<name>)", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(r"(?P<place>.+?)\s*\((?P<arguments>[^()]*)\)", re.DOTALL)
 
@@ -34,7 +34,8 @@ class NamedObject:
 
     @staticmethod
     def read(text: str, folder: Path | None = None) -> "NamedObject":
-        """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`, `robot.urdf`.
+        """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`, `robot.urdf`,
+        `robot.mo:Package.Model`.
 
         folder: the one that paths are relative to; None for the current one.
         """
@@ -68,6 +69,10 @@ def named(text: str, folder: Path, library: str) -> Any:
     or prototype; errors of the call itself are not caught.
     """
     asked = NamedObject.read(text, folder)
+    if asked.file is not None and asked.file.suffix == ".mo":
+        raise ModelError(
+            f"found {text!r}, expected a class in a file of Python, as Robot = load_modelica(...)[...]"
+        )
     if asked.file is not None:
         module, name = load(asked.file), asked.name
     elif asked.module:

@@ -71,14 +71,14 @@ def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
         terms = _terms(symbols, known, [side for e in equations for side in (e.left, e.right)])
         for equation, *pair in zip(equations, terms[::2], terms[1::2], strict=True):
             fault = next((term.fault for term in pair if term.fault), "")
-            if fault:
-                raise ModelError(f"{equation.name}: {fault}")
             left, right = (term.unit for term in pair)
-            if not _agree(left, right):
-                raise ModelError(
-                    f"{equation.name}: units disagree in `{equation.text[:160]}`: the left side is in "
+            if not fault and not _agree(left, right):
+                fault = (
+                    f"units disagree in `{equation.text[:160]}`: the left side is in "
                     f"{_text(left)}, the right side in {_text(right)}; correct the equation or a declaration"
                 )
+            if fault and not {"", equation.path, equation.path.rpartition(".")[0]} & flat.unchecked:
+                raise ModelError(f"{equation.name}: {fault}")
 
 
 def _events(flat: FlatModel) -> list[Equation]:

@@ -199,7 +199,8 @@ class FlatModel(Record):
     as simulations have them; before: symbols of the values of discretes just before an instant, by their names;
     modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from the past;
     ranges: where tables end that are not defined beyond;
-    rods: what a robot says of its links, by name; shapes: what its components look like, by names.
+    rods: what a robot says of its links, by name; shapes: what its components look like, by names; unchecked: paths of
+    components whose units are words only; experiment: what the model says of its simulation, `StopTime`.
     """
 
     name: str
@@ -227,6 +228,8 @@ class FlatModel(Record):
     modes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rods: Rods | None = None
     shapes: tuple[Shape, ...] = ()
+    unchecked: frozenset[str] = frozenset()
+    experiment: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def vectors(self) -> Mapping[str, FlatVariable]:

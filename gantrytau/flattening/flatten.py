@@ -144,7 +144,7 @@ def write_out(instance: Instance) -> FlatModel:
         delays=delays,
         ranges=_ranges(instance.symbols, spread),
         modes=stated.modes,
-        rods=rods_of(instance.root),
+        **_said(instance),
         shapes=_shapes(instance, absent),
     )
 
@@ -155,6 +155,12 @@ def _shapes(instance: Instance, absent: Mapping[str, str]) -> tuple[Shape, ...]:
     found = shapes_of(instance.components, known)
     gone = {p.name for p in instance.quantities if absent.keys() & set(p.elements)} | set(absent)
     return tuple(shape for shape in found if not gone & set(shape.names))
+
+
+def _said(instance: Instance) -> dict[str, Any]:
+    """What the components say of themselves beside their equations."""
+    unchecked = frozenset(path for path, one in instance.components if not one.checks_units)
+    return dict(rods=rods_of(instance.root), unchecked=unchecked, experiment=instance.root.experiment)
 
 
 def _kinds(placed: Sequence[Placed]) -> dict[str, str]:

@@ -104,7 +104,8 @@ class _Growing(Instance):
     outers: list[tuple[Any, str, Outer, list[Any]]] = field(default_factory=list)
 
     def build(self, template: Declared, path: str, outer: Mapping[Any, Any], scope: Any, around: list[Any]):
-        cls = type(template)
+        modifications = _merge(_wrap(template.modifications, scope), outer)
+        cls = type(template).shaped(modifications)
         instance = cls.__new__(cls)
         for name, value in vars(template).items():
             if name in ("_modifications", "_chosen_starts"):
@@ -117,7 +118,6 @@ class _Growing(Instance):
                 )
             instance.__dict__[name] = value
         self.paths[id(instance)] = path
-        modifications = _merge(_wrap(template.modifications, scope), outer)
         for name in modifications:
             check_member(cls, name, f"{path} ({cls.__name__})" if path else cls.__name__)
             if is_setting(getattr(cls, name), name):
@@ -167,7 +167,13 @@ class _Growing(Instance):
                 if isinstance(one, Leaf):
                     element, here, own = one.value, one.scope, one.more
                 built.append(
-                    self.build(element, f"{place}[{index}]", _merge(common, own), here, [*around, instance])
+                    self.build(
+                        element,
+                        f"{place}[{index + instance.first_index}]",
+                        _merge(common, own),
+                        here,
+                        [*around, instance],
+                    )
                 )
             instance.__dict__[name] = tuple(built)
         else:
@@ -203,7 +209,7 @@ class _Growing(Instance):
                 )
             attributes |= changes
         shape = _shape(declaration, attributes, instance, full)
-        names = element_names(full, shape)
+        names = element_names(full, shape, instance.first_index)
         kind = declaration.kind
         vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
         symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
@@ -224,7 +230,7 @@ class _Growing(Instance):
     def resolve_outers(self) -> None:
         for instance, name, wanted, around in self.outers:
             for enclosing in reversed(around):
-                found = [x for x in vars(enclosing).values() if isinstance(x, wanted.component)]
+                found = wanted.candidates(enclosing)
                 if len(found) > 1:
                     kind = wanted.component.__name__
                     raise ModelError(
@@ -238,6 +244,11 @@ class _Growing(Instance):
             else:
                 place = self.paths[id(instance)] or type(instance).__name__
                 kind = wanted.component.__name__
+                if wanted.name:
+                    raise ModelError(
+                        f"{place} ({type(instance).__name__}): found no 'inner' {wanted.name} in any model around it, "
+                        f"expected one; declare it in {type(around[0]).__name__}"
+                    )
                 raise ModelError(
                     f"{place} ({type(instance).__name__}): found no {kind} in any model around it, expected one; "
                     f"declare `{kind.lower()} = {kind}()` in the body of {type(around[0]).__name__}"

@@ -6,7 +6,7 @@ An instance remembers its modifications and nothing else; `gantrytau.flattening.
 import copy
 import functools
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Self, TypeGuard
+from typing import Any, ClassVar, Self, TypeGuard
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.describing.described import Description
@@ -40,7 +40,15 @@ def refuse_container(path: str, value: Any) -> None:
 
 
 class Declared(_Part):
-    """Base of Model and Connector: declarations in the class body, modifications as keywords."""
+    """Base of Model and Connector: declarations in the class body, modifications as keywords.
+
+    first_index: of the elements of its arrays in names; checks_units: whether units that disagree are an error;
+    inner_names: names of components that an `Outer` by name may mean.
+    """
+
+    first_index = 0
+    checks_units = True
+    inner_names: frozenset[str] = frozenset()
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
@@ -117,6 +125,11 @@ class Declared(_Part):
         return found
 
     @classmethod
+    def shaped(cls, modifications: Mapping[str, Any]) -> type[Self]:
+        """The class of an instance with these modifications, where some say which members it has; else this class."""
+        return cls
+
+    @classmethod
     @functools.cache
     def members(cls) -> dict[str, Any]:
         """Declarations, components and arrays of the class and its bases, in order of declaration."""
@@ -159,6 +172,7 @@ class Model(Declared):
     """
 
     drawn = True  # whether pictures show it and what is in it
+    experiment: ClassVar[Mapping[str, float]] = {}  # what its author says of a simulation: `StopTime`, s
 
     def equations(self) -> Iterator[Any]:
         """Equations (`a == b`) and connections (`connect(a, b)`), one per yield."""
@@ -170,10 +184,21 @@ class Model(Declared):
 
 
 class Outer:
-    """The component of a class that stands in this model or nearest around it: `world = Outer(World)`."""
+    """The component of a class that stands in this model or nearest around it: `world = Outer(World)`.
 
-    def __init__(self, component: type[Any]):
+    name: of that component, where it is found by its name.
+    """
+
+    def __init__(self, component: type[Any], name: str = ""):
         self.component = component
+        self.name = name
+
+    def candidates(self, around: Any) -> list[Any]:
+        """The components of an instance that it may mean."""
+        found = vars(around)
+        if self.name:
+            return [found[self.name]] if self.name in found and self.name in type(around).inner_names else []
+        return [x for x in found.values() if isinstance(x, self.component)]
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(

@@ -78,6 +78,8 @@ def _modified(
     elif isinstance(member, Outer):
         raise ModelError(f"{path} refers to a component further out; set it there")
     elif isinstance(member, Array):
+        if rest and isinstance(rest[0], int):
+            rest[0] -= component.first_index
         new = _array(member, old, under, rest, value, path)
     elif isinstance(member, Declared):
         new = _component(member, old, under, rest, value, path)

@@ -164,13 +164,14 @@ def derivatives_in(expression: ca.SX) -> tuple[Derivative, ...]:
     return tuple(split_derivative(leaf.name()) for leaf in ca.symvar(expression))
 
 
-def element_names(name: str, shape: tuple[int, ...]) -> list[str]:
-    """Names of the elements of a quantity, column after column as CasADi orders them."""
+def element_names(name: str, shape: tuple[int, ...], first: int = 0) -> list[str]:
+    """Names of the elements of a quantity, column after column as CasADi orders them; first: the lowest index."""
     if shape == ():
         return [name]
-    if len(shape) == 1:
-        return [f"{name}[{i}]" for i in range(shape[0])]
-    return [f"{name}[{i},{j}]" for j in range(shape[1]) for i in range(shape[0])]
+    rows, *columns = (range(first, first + size) for size in shape)
+    if not columns:
+        return [f"{name}[{i}]" for i in rows]
+    return [f"{name}[{i},{j}]" for j in columns[0] for i in rows]
 
 
 _current: ContextVar[Symbols | None] = ContextVar("symbols of the model being written out", default=None)

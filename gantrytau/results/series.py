@@ -73,7 +73,7 @@ class Series:
         self._shapes = tuple(shapes)
         self._names = (*(name for name in values if name != "time"), *self._aliases)
         self._scalars = frozenset(self._names)
-        self._arrays = _arrays(self._names)
+        self._arrays = _arrays(self._names, tuple(self._descriptions))
         targets = self._scalars - self._aliases.keys() | {"time"}
         for name, target in self._aliases.items():
             if target.removeprefix("-") in targets:
@@ -281,19 +281,26 @@ def split_element(name: str) -> tuple[str, tuple[int, ...]] | None:
 
 
 @lru_cache(maxsize=16)  # results of one model have the same names
-def _arrays(names: tuple[str, ...]) -> Mapping[str, np.ndarray]:
-    """Array name -> element names in the shape of the array, for arrays all of whose elements exist."""
+def _arrays(names: tuple[str, ...], described: tuple[str, ...]) -> Mapping[str, np.ndarray]:
+    """Array name -> element names in the shape of the array, for arrays all of whose elements exist.
+
+    Indices begin at 0; at 1 where the array is described and has no element 0, as Modelica writes it.
+    """
     found: dict[str, dict[tuple[int, ...], str]] = {}
     for name in names:
         element = split_element(name)
         if element:
             found.setdefault(element[0], {})[element[1]] = name
-    arrays, scalars = {}, frozenset(names)
+    arrays, scalars, words = {}, frozenset(names), frozenset(described)
     for base, elements in found.items():
         if base in scalars or len({len(index) for index in elements}) > 1:
             continue
-        shape = tuple(int(size) for size in np.max(list(elements), axis=0) + 1)
+        places = np.array(list(elements))
+        zero = f"{base}[{','.join('0' * places.shape[1])}]"
+        first = 1 if np.all(places.min(axis=0) == 1) and base in words and zero not in words else 0
+        shape = tuple(int(size) for size in np.max(places, axis=0) + 1 - first)
         if len(elements) == np.prod(shape):
-            arrays[base] = np.array([elements[index] for index in np.ndindex(*shape)], dtype=object)
+            indices = (tuple(k + first for k in index) for index in np.ndindex(*shape))
+            arrays[base] = np.array([elements[index] for index in indices], dtype=object)
             arrays[base] = arrays[base].reshape(shape)
     return arrays

@@ -42,7 +42,7 @@ ROUNDS = 3  # of a run whose states prove to be smaller than was thought
 def simulate(
     model: Model | Translated,
     *,
-    stop: float,
+    stop: float | None = None,
     start: float = 0.0,
     inputs: Mapping[str, Any] | None = None,
     parameters: Mapping[str, Any] | None = None,
@@ -57,8 +57,9 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: begin and end of the run, s. inputs: name -> number, function of time, `Samples` ((times, values) for
-    short) or a signal such as `white_noise`; other inputs keep their start values.
+    start, stop: begin and end of the run, s; without stop the end is that of the model's `experiment`.
+    inputs: name -> number, function of time, `Samples` ((times, values) for short) or a signal such as `white_noise`; other
+    inputs keep their start values.
     parameters: name -> value, in place of the model's. Starts become consistent anew: those not fixed move as little as
     possible, whereas an FMU keeps the states of its export.
     starts: name -> start value, in place of the model's, without a new translation. Quantities without a start given here
@@ -81,10 +82,13 @@ def simulate(
     """
     policy = checked_policy("simulate", locals())
     start, tolerance, max_step = policy["start"], policy["tolerance"], policy["max_step"]
-    stop = number("simulate", "stop", stop, unit="s", above=start)
+    if stop is not None:
+        stop = number("simulate", "stop", stop, unit="s", above=start)
     check_seed("simulate", seed)
     wanted = names(outputs or ())
     dae = _changed(model, parameters, wanted)
+    if stop is None:
+        stop = number("simulate", "stop", dae.flat.experiment.get("StopTime"), unit="s", above=start)
     dae = stopping(dae) if limits == "stop" else dae
     dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)

@@ -4,6 +4,7 @@ import csv
 import json
 import signal
 import sys
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -249,3 +250,11 @@ def test_what_is_not_finite_is_told_beside_the_answer(run, answer, tmp_path):
     words = "Root: y is not finite from t = 0.5"  # or 0.502, by rounding
     assert words in run(*arguments).stderr
     assert words in answer(*arguments)["warnings"][0]
+
+
+def test_a_class_of_modelica_text_is_a_model(run):
+    file = Path(__file__).parents[1] / "modelica" / "motions.mo"
+    said = run("simulate", f"{file}:Motions.Ball", "--set", "e=0.5", "--json")
+    assert json.loads(said.stdout)["ended"] == "enough"
+    assert "did you mean 'Motions.Ball'" in run("simulate", f"{file}:Motions.Bal").stderr
+    assert "name one, as motions.mo:Motions.Ball" in " ".join(run("check", file).stderr.split())

@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import gantrytau_models
-from gantrytau import Connector, Model, ModelError, check_member, parameters_of, read_parameters, with_setting
+from gantrytau import (
+    Connector,
+    Model,
+    ModelError,
+    check_member,
+    load_modelica,
+    parameters_of,
+    read_parameters,
+    with_setting,
+)
 from gantrytau.border import NamedObject, import_by_name, load, prototype, similar, source_of
 from gantrytau.commands.arguments.values import number, split
 from gantrytau.commands.printing.reporting import CommandError, note, refusing
@@ -68,6 +77,8 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     wanted = _wanted(choice, text, robot)
     if choice.file and choice.file.suffix.lower() == ".urdf":
         found = _in_urdf(choice.file, kind)
+    elif choice.file and choice.file.suffix == ".mo":
+        found = _in_text(choice.file, choice.name, kind)
     else:
         found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
     if isinstance(found, Model):
@@ -219,6 +230,18 @@ def _in_urdf(file: Path, kind: Kind) -> type[Model]:
         raise CommandError(f"{file.name} is a robot, expected {kind}")
     loops = file.with_suffix(".loops.toml")
     return read_urdf(file, loops if loops.is_file() else None)
+
+
+def _in_text(file: Path, name: str, kind: Kind) -> Any:
+    """The class of a Modelica file; without a name, the only model in it."""
+    library = load_modelica(file)
+    models = [one for one in library.names if library.kind_of(one) in ("model", "block")]
+    if not name and len(models) != 1:
+        what = f"several models ({', '.join(models)})" if models else "no model"
+        raise CommandError(
+            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), 'Model')}"
+        )
+    return _checked(library[name or models[0]], f"{file.name}:{name}", kind)
 
 
 def _checked(found: Any, name: str, kind: Kind) -> Any:

@@ -12,7 +12,7 @@ ModelName = Annotated[
     typer.Argument(
         metavar="MODEL",
         help="A model of the library (`gantrytau library` lists them), as Pendulum or 'GantryTau(D1)', "
-        "or a class in a file of yours, as robot.py:Robot.",
+        "or a class in a file of yours, as robot.py:Robot or robot.mo:Package.Model.",
         autocompletion=shell_offers.models,
         show_default=False,
     ),

@@ -41,7 +41,7 @@ HEADINGS = {  # kind of a quantity or of another row -> heading, in the order in
     "outer": "Around it",
 }
 ATTRIBUTES = ("start", "fixed", "min", "max", "nominal", "prefer", "undetermined", "assumed")
-HIDDEN = {"drawn"}  # settings of every model
+HIDDEN = {"drawn", "first_index", "checks_units"}  # settings of every model
 
 
 def model_described(thing: Any, name: str = "") -> Description:

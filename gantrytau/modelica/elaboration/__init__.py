@@ -1,0 +1,1 @@
+"""From trees of Modelica text to classes of the language: lookup, modifications, values, equations."""

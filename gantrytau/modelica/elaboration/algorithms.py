@@ -1,0 +1,303 @@
+"""Functions and algorithms, carried out on values and on expressions of symbols alike (Modelica 3.6, chapters 11 and 12)."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import values
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element
+from gantrytau.modelica.elaboration.statements import Items, looped
+from gantrytau.modelica.elaboration.values import RecordValue
+
+MOST_ROUNDS = 100_000  # of a `while`
+
+
+class LeftBlock(Exception):
+    """`break` or `return`: the word."""
+
+
+@dataclass
+class Execution:
+    """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before."""
+
+    reader: Interpreter
+    known: dict[str, Any] = field(default_factory=dict)
+
+    def run(self, items: Items, local: Mapping[str, Any] | None = None) -> None:
+        """Carry out statements, one after another; local: values of the iterators around them."""
+        for item in items:
+            reader = replace(self.reader, local={**self.reader.local, **self.known, **(local or {})})
+            if isinstance(item, tree.Assignment):
+                self._assign(item, reader)
+            elif isinstance(item, tree.ForLoop):
+                self._repeat(item, reader, local or {})
+            elif isinstance(item, tree.WhileLoop):
+                self._while(item, local or {})
+            elif isinstance(item, tree.Branching) and item.word == "if":
+                self._branch(item, reader, local or {})
+            elif isinstance(item, tree.Leave):
+                raise LeftBlock(item.word)
+            elif isinstance(item, tree.ProcedureCall):
+                self._call(item, reader)
+            else:
+                reader.scope.refuse(
+                    item.at,
+                    "found a statement that is not supported here, expected ':=', 'if' or 'for'",
+                )
+
+    def _call(self, item: tree.ProcedureCall, reader: Interpreter) -> None:
+        if item.call.function.parts[-1][0] != "assert":
+            reader.scope.refuse(item.at, "found the call of a function whose results are lost, expected ':='")
+        holds = reader.value(item.call.arguments[0])
+        if not isinstance(holds, ca.SX) and not holds:
+            reader.scope.refuse(item.at, f"found what does not hold: {reader.value(item.call.arguments[1])}")
+
+    def _assign(self, item: tree.Assignment, reader: Interpreter) -> None:
+        value = reader.results(item.value)
+        found = value if isinstance(value, tuple) else (value,)
+        if len(item.targets) > len(found):
+            reader.scope.refuse(
+                item.at, f"found {len(item.targets)} names to assign to, expected at most {len(found)}"
+            )
+        for target, one in zip(item.targets, found, strict=False):
+            if target is not None:
+                name = target.parts[0][0]
+                if name not in self.known:
+                    hint = did_you_mean(name, self.known)
+                    reader.scope.refuse(
+                        target.at,
+                        f"found '{name}' assigned, expected a variable of the function{hint}",
+                    )
+                try:
+                    self.known[name] = _with(self.known[name], target.parts, one, reader)
+                except ModelError as error:
+                    reader.scope.refuse(target.at, str(error))
+
+    def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        for inner in looped(item, reader):
+            steps = {name: inner.local[name] for name, _ in item.iterators}
+            try:
+                self.run(item.items, {**local, **steps})
+            except LeftBlock as left:
+                if str(left) == "return":
+                    raise
+                break
+
+    def _while(self, item: tree.WhileLoop, local: Mapping[str, Any]) -> None:
+        for _ in range(MOST_ROUNDS):
+            reader = replace(self.reader, local={**self.reader.local, **self.known, **local})
+            test = reader.value(item.condition)
+            if isinstance(test, ca.SX):
+                reader.scope.refuse(
+                    item.at,
+                    "found a loop whose length varies, expected 'for' over what is known",
+                )
+            if not test:
+                return
+            try:
+                self.run(item.items, local)
+            except LeftBlock as left:
+                if str(left) == "return":
+                    raise
+                return
+        self.reader.scope.refuse(
+            item.at, f"found a loop of more than {MOST_ROUNDS} rounds, expected one that ends"
+        )
+
+    def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
+        tests: list[tuple[Any, Items]] = []
+        last: Items = item.otherwise or ()
+        for test, items in item.branches:
+            known = values.tested(reader.value(test))
+            if isinstance(known, ca.SX):
+                tests.append((known, items))
+            elif known:
+                last = items
+                break
+        if not tests:
+            self.run(last, local)
+            return
+        before = self.known
+        try:
+            self.known = dict(before)
+            self.run(last, local)
+            for test, items in reversed(tests):
+                other, self.known = self.known, dict(before)
+                self.run(items, local)
+                self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
+        except LeftBlock as left:
+            reader.scope.refuse(
+                item.at,
+                f"found '{left}' where the condition varies, expected a known one",
+            )
+
+
+def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
+    if then is otherwise:
+        return then
+    if then is None or otherwise is None:
+        return None  # not yet known in one branch: told where it is asked for
+    if isinstance(then, RecordValue):
+        return RecordValue({n: _chosen(test, one, otherwise[n], n) for n, one in then.items()})
+    return values.chosen(test, then, otherwise, smooth=False)
+
+
+def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
+    """A value with another one where a reference points to."""
+    subscripts, rest = parts[0][1], parts[1:]
+    if len(parts) == 1 and not subscripts:
+        return new
+    if not subscripts:
+        inner = parts[1][0]
+        if not isinstance(old, RecordValue) or inner not in old:
+            raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
+        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
+    if rest or not isinstance(old, np.ndarray):
+        raise ModelError(
+            "found an element of what is no array of a known size assigned, expected an array of numbers"
+        )
+    found = old.copy()
+    places = tuple(reader.places(one, size) for one, size in zip(subscripts, old.shape, strict=True))
+    many = [place if isinstance(place, list) else [place] for place in places]
+    shape = tuple(len(place) for place in places if isinstance(place, list))
+    if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
+        raise ModelError(
+            f"found the size {values.size_words(new)} assigned to {list(shape)}, expected one size"
+        )
+    flat = iter(new.flat) if isinstance(new, np.ndarray) else iter([new])
+    for index in np.ndindex(*map(len, many)):
+        found[tuple(axis[k] for axis, k in zip(many, index, strict=True))] = next(flat)
+    return found
+
+
+def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
+    """The equations that an algorithm of a model amounts to: one for each variable that it assigns."""
+    run = Execution(reader, dict.fromkeys(_assigned(items)))
+    run.run(items)
+    for name, value in run.known.items():
+        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
+        if right is None:
+            raise ModelError(
+                f"found '{name}' without a value at the end of an algorithm, expected one in each branch"
+            )
+        yield ca.SX(left) == right
+
+
+def _assigned(items: Items) -> Iterator[str]:
+    for item in items:
+        if isinstance(item, tree.Assignment):
+            yield from (target.parts[0][0] for target in item.targets if target is not None)
+        elif isinstance(item, (tree.ForLoop, tree.WhileLoop)):
+            yield from _assigned(item.items)
+        elif isinstance(item, tree.Branching):
+            for _, inner in (*item.branches, (None, item.otherwise or ())):
+                yield from _assigned(inner)
+
+
+def called_class(
+    scope: ClassScope,
+    arguments: Sequence[Any],
+    named: Mapping[str, Any],
+    beyond: Surroundings,
+    constants: Members,
+) -> Any:
+    """The value of a function, several as a tuple, or of the constructor of a record."""
+    definition = scope.definition
+    record = definition.kind == "record"
+    if not record and definition.kind != "function":
+        raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
+    external = definition.body.external if isinstance(definition.body, tree.Composition) else None
+    if external is not None and external.language != "builtin":
+        raise ModelError(
+            f"found {scope.name}, an external function, which is not supported; write an algorithm"
+        )
+    inputs = {n: e for n, e in scope.elements.items() if record or "input" in e.clause.prefixes}
+    given = _given(scope, inputs, arguments, named)
+    mapped = next((n for n, one in given.items() if not record and _is_longer(inputs[n], one)), None)
+    if mapped is not None:
+        longer = {n for n, one in given.items() if _is_longer(inputs[n], one)}
+        count = range(len(given[mapped]))
+        all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
+        each = [called_class(scope, (), one, beyond, constants) for one in all_given]
+        return values.array(each)
+    if external is not None:
+        return values.called(external.function or definition.name, [given[n] for n in inputs], {})
+    run = Execution(Interpreter(scope, constants, beyond), {})
+    for name, element in scope.elements.items():
+        run.known[name] = given[name] if name in given else _initial(name, element, run, name in inputs)
+    if record:
+        return RecordValue(run.known)
+    try:
+        for section in scope.sections:
+            run.reader = replace(run.reader, scope=section.scope)
+            run.run(section.items)
+    except LeftBlock:
+        pass
+    outputs = [n for n, e in scope.elements.items() if "output" in e.clause.prefixes]
+    missing = next((n for n in outputs if _is_open(run.known[n])), None)
+    if missing is not None or not outputs:
+        raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
+    found = tuple(run.known[n] for n in outputs)
+    return found if len(found) > 1 else first_result(found)
+
+
+def _is_open(value: Any) -> bool:
+    return value is None or (isinstance(value, np.ndarray) and any(one is None for one in value.flat))
+
+
+def _dimensions(element: Element) -> int:
+    return len(element.declaration.subscripts) + len(element.clause.subscripts)
+
+
+def _is_longer(element: Element, value: Any) -> bool:
+    """Whether a function of scalars is given an array, of which it takes each element."""
+    return (
+        isinstance(value, np.ndarray)
+        and value.ndim == _dimensions(element) + 1
+        and not _is_array_type(element)
+    )
+
+
+def _is_array_type(element: Element) -> bool:
+    body = element.scope.find_class(element.clause.type, element.clause.at).definition.body
+    return isinstance(body, tree.ShortClass) and bool(body.subscripts)
+
+
+def _given(
+    scope: ClassScope, inputs: Mapping[str, Element], arguments: Sequence[Any], named: Mapping[str, Any]
+) -> dict[str, Any]:
+    if len(arguments) > len(inputs):
+        raise ModelError(f"found {len(arguments)} arguments of {scope.name}, expected at most {len(inputs)}")
+    found = dict(zip(inputs, arguments, strict=False))
+    for name, one in named.items():
+        if name not in inputs:
+            raise ModelError(
+                f"found the argument '{name}', which {scope.name} does not have{did_you_mean(name, inputs)}"
+            )
+        if name in found:
+            raise ModelError(f"found two values for '{name}' of {scope.name}, expected one")
+        found[name] = one
+    return found
+
+
+def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:
+    """The value of what a function declares, before its algorithm; None, or an array of None, where it has none."""
+    reader = replace(run.reader, scope=element.scope, local={**run.reader.local, **run.known})
+    said = element.modifier
+    if said.value is not None:
+        return replace(reader, scope=said.scope).value(said.value)
+    if needed:
+        raise ModelError(f"found no value for '{name}' of {run.reader.scope.name}, expected one")
+    sizes = [*element.declaration.subscripts, *element.clause.subscripts]
+    if any(isinstance(one, tree.Mark) for one in sizes) or not sizes:
+        kind = element.scope.find_class(element.clause.type, element.clause.at)
+        members = kind.elements if kind.definition.kind == "record" else {}
+        return RecordValue(dict.fromkeys(members)) if members else None
+    return np.empty([reader.value(one) for one in sizes], dtype=object)

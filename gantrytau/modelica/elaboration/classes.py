@@ -1,0 +1,270 @@
+"""Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+from gantrytau.border.refusal import ModelError
+from gantrytau.language.declarations import Array, Discrete
+from gantrytau.language.model import Connector, Declared, Model, Outer
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
+from gantrytau.modelica.elaboration.modifiers import Modifier, merged
+from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
+from gantrytau.modelica.elaboration.statements import (
+    AbsentComponent,
+    first_valued,
+    remembers,
+    sample_calls,
+    stated,
+)
+from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
+
+TAKEN = {
+    "equations",
+    "initial_equations",
+    "members",
+    "modified",
+    "modifications",
+    "chosen_starts",
+    "shaped",
+    "structure",
+}
+
+
+class TextClass(Declared):
+    """What classes of Modelica text have in common. structure: of an instance without modifications."""
+
+    structure: ClassVar[Structure]
+    first_index = 1
+    checks_units = False
+
+    def __init__(self, defaults: Mapping[str, Any] | None = None, /, **modifications: Any):
+        super().__init__(defaults, **modifications)
+        self.__class__ = type(self).shaped(self.modifications)
+
+    def modified(self, modifications: Mapping[str, Any], starts: Iterable[str] | None = None) -> Self:
+        found = super().modified(modifications, starts)
+        found.__class__ = type(found).shaped(found.modifications)
+        return found
+
+    @classmethod
+    def shaped(cls, modifications: Mapping[str, Any]) -> type[Self]:
+        found = _shaping(cls.structure, modifications)
+        if not found:
+            return cls
+        old = cls.structure
+        above = Structure(old.scope, merged(plain(found), old.modifier), old.beyond, old.path)
+        above.prepare()
+        return class_of(above, cls)
+
+
+class ModelicaModel(TextClass, Model):
+    """A model, block or record of Modelica text."""
+
+    def equations(self) -> Iterator[Any]:
+        yield from _sections(self, initial=False)
+
+    def initial_equations(self) -> Iterator[Any]:
+        yield from _sections(self, initial=True)
+
+
+class ModelicaConnector(TextClass, Connector):
+    """A connector of Modelica text."""
+
+
+def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of some modifications that change what shapes a model, nested."""
+    found: dict[str, Any] = {}
+    for name, given in modifications.items():
+        one = structure.members.get(name) if isinstance(name, str) else None
+        if one is None or not one.present:
+            continue
+        if one.own.final:
+            raise ModelError(
+                f"{structure.scope.name}: found a modification of '{name}', which is final, expected none"
+            )
+        value = given if isinstance(given, Mapping) else getattr(given, "value", given)
+        if one.primitive is not None and one.is_folded:
+            if isinstance(value, (bool, int, float, str)) and value != _known(one):
+                found[name] = value
+        elif one.primitive is None and isinstance(value, Mapping) and not one.shape:
+            inner = _shaping(one.children[0], value)
+            found |= {name: inner} if inner else {}
+    return found
+
+
+def _known(one: ClassMember) -> Any:
+    return None if one.full.value is None else one.owner.member(one.name)
+
+
+def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
+    """The class of a structure all of whose sizes and conditions have been asked for; base: one it is a variant of."""
+    scope = structure.scope
+    _refuse_kind(structure)
+    body: dict[str, Any] = {
+        "__module__": Path(scope.source.name).name,
+        "structure": structure,
+        "__doc__": scope.definition.description,
+    }
+    held = set(_held(structure))
+    before = dict(_first_values(structure, held))
+    for name, one in structure.members.items():
+        if name in TAKEN or name.startswith("_"):
+            scope.refuse(
+                one.element.declaration.at,
+                f"found a component '{name}', a name that is taken, expected another name",
+            )
+        if not one.present:
+            body[name] = None
+        elif "outer" in one.prefixes and "inner" not in one.prefixes:
+            body[name] = Outer(Declared, name)
+        elif one.primitive is not None:
+            add_quantity(body, one, name in held, before.get(name))
+        else:
+            body[name] = _component(one)
+    tests = (test for item in _whens(structure) for test, _ in item.branches)
+    for call in (call for test in tests for call in sample_calls(test)):
+        start = Modifier(call.arguments[0], scope)
+        body[sample_name(call)] = Discrete(
+            Bound(start, structure), unit="s", description="next instant of sample()"
+        )
+    if _is_connector(structure):
+        return type(scope.definition.name, (base or ModelicaConnector,), body)
+    body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
+    body["experiment"] = experiment_of(structure)
+    return type(scope.definition.name, (base or ModelicaModel,), body)
+
+
+def _is_connector(structure: Structure) -> bool:
+    return structure.scope.definition.kind == "connector"
+
+
+def _refuse_kind(structure: Structure) -> None:
+    definition = structure.scope.definition
+    if definition.kind in ("package", "function", "type", "operator"):
+        structure.scope.refuse(
+            definition.at,
+            f"found the {definition.kind} {structure.scope.name}, expected a model, block, connector or record",
+        )
+    if "expandable" in definition.prefixes:
+        structure.scope.refuse(
+            definition.at, "found an expandable connector, which is not supported; declare its members"
+        )
+    if isinstance(definition.body, tree.Composition) and definition.body.external is not None:
+        structure.scope.refuse(
+            definition.at, "found an external function, which is not supported, expected an algorithm"
+        )
+
+
+def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Modifier]]:
+    """Names and values of the initial equations of what a `when` sets, as `pre(x) = 1` or `x = 1`."""
+    for section in structure.scope.sections:
+        for item in section.items if section.kind == "initial equation" else ():
+            name = first_valued(item)
+            if name in held and isinstance(item, tree.SimpleEquation):
+                structure.started.append(item)
+                yield name, Modifier(item.right, section.scope, at=item.at)
+
+
+def _held(structure: Structure) -> Iterator[str]:
+    """Names of what a `when` sets."""
+    for section in structure.scope.sections:
+        switches = [item for item in section.items if section.kind == "equation" and remembers(item)]
+        yield from (
+            item.left.parts[0][0] for item in switches if isinstance(item.left, tree.ComponentReference)
+        )
+    for item in _whens(structure):
+        for _, items in item.branches:
+            left = list(items)
+            for one in left:
+                if isinstance(one, tree.ForLoop):
+                    left += one.items
+                targets = (one.left,) if isinstance(one, tree.SimpleEquation) else ()
+                for target in targets:
+                    for each in target.items if isinstance(target, tree.OutputList) else (target,):
+                        if isinstance(each, tree.ComponentReference):
+                            yield each.parts[0][0]
+
+
+def _whens(structure: Structure) -> Iterator[tree.Branching]:
+    """All `when` among the equations of a class."""
+    left = [item for section in structure.scope.sections for item in section.items]
+    for item in left:
+        if isinstance(item, tree.Branching) and item.word == "when":
+            yield item
+        elif isinstance(item, tree.Branching):
+            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
+        elif isinstance(item, tree.ForLoop):
+            left += item.items
+
+
+def _component(one: ClassMember) -> Any:
+    """A component, or an array of components, with what its declaration says."""
+    owner = one.owner
+    if not one.shape:
+        (child,) = one.children
+        return _opened(class_of(child), keywords_of(child, one.own, owner))
+    made: dict[int, type[Any]] = {}
+
+    def element(index: int) -> Any:
+        child = one.children[index]
+        made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
+        return _opened(made[index], keywords_of(child, one.own.of_element(index), owner))
+
+    found = Array(Declared, 0)
+    found.elements = [element(k) for k in range(one.shape[0])]
+    found.component = made[0] if made else Declared
+    return found
+
+
+def child_differs(a: Structure, b: Structure) -> bool:
+    """Whether two elements of an array have different values of what shapes them."""
+    for name, one in a.members.items():
+        other = b.members[name]
+        if one.primitive is not None:
+            if one.is_folded and one.full.value is not None and str(_known(one)) != str(_known(other)):
+                return True
+        elif (one.present, one.shape) != (other.present, other.shape) or any(
+            child_differs(x, y) for x, y in zip(one.children, other.children, strict=True)
+        ):
+            return True
+    return False
+
+
+def _opened(cls: type[Any], keywords: Mapping[str, Any]) -> Any:
+    found: Any = object.__new__(cls)
+    Declared.__init__(found, **keywords)
+    return found
+
+
+def experiment_of(structure: Structure) -> dict[str, float]:
+    """The numbers of the annotation `experiment`."""
+    for one in structure.scope.definition.annotation or ():
+        if isinstance(one, tree.Argument) and one.name == "experiment" and one.modification is not None:
+            said = [
+                a for a in one.modification.arguments or () if isinstance(a, tree.Argument) and a.modification
+            ]
+            found = {a.name: a.modification.value for a in said if a.modification is not None}
+            reader = structure.interpreter(structure.scope)
+            return {
+                n: float(reader.value(v))
+                for n, v in found.items()
+                if isinstance(v, (tree.Number, tree.Unary))
+            }
+    return {}
+
+
+def _sections(instance: Any, initial: bool) -> Iterator[Any]:
+    """The statements of the sections that hold at all times, or at the start."""
+    structure: Structure = type(instance).structure
+    for section in structure.scope.sections:
+        if section.kind.startswith("initial") != initial:
+            continue
+        read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
+        items = [one for one in section.items if not any(one is other for other in structure.started)]
+        try:
+            yield from read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
+        except AbsentComponent as error:
+            raise ModelError(f"found {error} in an equation, expected a component that is there") from None

@@ -1,0 +1,360 @@
+"""Expressions of Modelica as values: numbers where all is known, else expressions of the symbols of an instance."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.border.refusal import ModelError, did_you_mean, in_words
+from gantrytau.language.symbols import time
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import values
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+
+
+class Members(Protocol):
+    """An instance of a class: a component, a package with its constants, or what a function computes with."""
+
+    def has(self, name: str) -> bool:
+        """Whether its class has a component of that name."""
+        ...
+
+    def member(self, name: str) -> Any:
+        """The value of a component."""
+        ...
+
+    def names(self) -> Sequence[str]:
+        """Names of its components."""
+        ...
+
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        """The sizes of a component; None where only its value has them."""
+        ...
+
+    def next_sample(self, call: tree.Call) -> Any:
+        """The next instant of a `sample`."""
+        ...
+
+    def is_fixed(self, expression: tree.Expression) -> bool:
+        """Whether it holds parameters and constants only."""
+        ...
+
+
+class Surroundings(Protocol):
+    """What lies beyond an expression: constants of packages, and functions."""
+
+    def package(self, scope: ClassScope) -> Members:
+        """The constants of a package."""
+        ...
+
+    def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
+        """The value of a function, or of the constructor of a record; several results as a tuple."""
+        ...
+
+
+def first_result(value: Any) -> Any:
+    """The first of several results of a function, which is its value in an expression."""
+    return next(iter(value)) if isinstance(value, tuple) else value
+
+
+@dataclass(frozen=True, eq=False)
+class Interpreter:
+    """Evaluates expressions of a class in an instance.
+
+    local: values of iterators and of what a function computes; end: the size that `end` means; quiet: no events.
+    """
+
+    scope: ClassScope
+    members: Members
+    library: Surroundings
+    local: Mapping[str, Any] = field(default_factory=dict)
+    end: int | None = None
+    quiet: bool = False
+
+    def with_local(self, **values: Any) -> "Interpreter":
+        """The same with further iterators."""
+        return replace(self, local={**self.local, **values})
+
+    def value(self, expression: Any) -> Any:
+        """The value of an expression; ModelError with its line for what has none. A plain value is itself."""
+        return first_result(self.results(expression))
+
+    def results(self, expression: Any) -> Any:
+        """The same; the call of a function with several results has all of them, as a tuple."""
+        if not isinstance(expression, tree.TreeNode):
+            return expression
+        try:
+            return _EVALUATE[type(expression)](self, expression)
+        except TextError:
+            raise
+        except ModelError as error:
+            self.scope.refuse(expression.at, str(error))
+        except (
+            RuntimeError,
+            TypeError,
+            NotImplementedError,
+            ValueError,
+            IndexError,
+            KeyError,
+            ArithmeticError,
+        ) as error:
+            self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
+
+    def _number(self, e: tree.Number) -> Any:
+        return e.value
+
+    def _literal(self, e: tree.StringLiteral) -> str:
+        return (
+            e.text.encode("latin-1", "backslashreplace").decode("unicode_escape")
+            if "\\" in e.text
+            else e.text
+        )
+
+    def _boolean(self, e: tree.BooleanLiteral) -> bool:
+        return e.value
+
+    def _mark(self, e: tree.Mark) -> Any:
+        if e.word != "end" or self.end is None:
+            raise ModelError(f"found '{e.word}', expected a value")
+        return self.end
+
+    def _unary(self, e: tree.Unary) -> Any:
+        return values.unary(e.operator, self.value(e.operand))
+
+    def _binary(self, e: tree.Binary) -> Any:
+        return values.binary(e.operator, self.value(e.left), self.value(e.right))
+
+    def _range(self, e: tree.RangeExpression) -> Any:
+        start, stop = self.value(e.start), self.value(e.stop)
+        step = self.value(e.step) if e.step is not None else 1
+        if not all(map(values.is_number, (start, stop, step))):
+            raise ModelError(
+                "found a range of variables, expected one that is known when the model is translated"
+            )
+        count = int(np.floor((stop - start) / step + 1e-9)) + 1
+        return values.array([start + k * step for k in range(max(count, 0))])
+
+    def _conditional(self, e: tree.Conditional) -> Any:
+        tests: list[tuple[Any, Any]] = []
+        otherwise: Any = e.otherwise
+        for test, then in e.branches:
+            known = values.tested(self.value(test))
+            if isinstance(known, ca.SX):
+                tests.append((known, then))
+            elif known:
+                otherwise = then
+                break
+        found = self.value(otherwise)
+        for test, then in reversed(tests):
+            found = values.chosen(test, self.value(then), found, self.quiet)
+        return found
+
+    def _array(self, e: tree.ArrayConstructor) -> Any:
+        if e.iterators:
+            return values.array(list(self._iterated(e.items[0], e.iterators)))
+        return values.array([self.value(one) for one in e.items])
+
+    def _iterated(self, item: tree.Expression, iterators: Sequence[tree.Iterator]) -> Iterator[Any]:
+        *others, (name, over) = iterators
+        for one in self.steps(over):
+            inner = self.with_local(**{name: one})
+            yield values.array(list(inner._iterated(item, others))) if others else inner.value(item)
+
+    def steps(self, over: tree.Expression | None) -> Sequence[Any]:
+        """The values of an iterator."""
+        if over is None:
+            raise ModelError("found an iterator without a range, expected 'in' and a range, as for i in 1:n")
+        found = self.value(over)
+        if isinstance(found, type) and issubclass(found, EnumerationValue):
+            raise ModelError("found an enumeration as a range, expected numbers")
+        if not isinstance(found, np.ndarray) or found.ndim != 1:
+            raise ModelError("found what is no vector as the range of an iterator, expected one, as 1:n")
+        return list(found)
+
+    def _matrix(self, e: tree.Matrix) -> Any:
+        rows = [[np.atleast_1d(values.boxed(self.value(one))) for one in row] for row in e.rows]
+        rows = [[one[:, None] if one.ndim == 1 else one for one in row] for row in rows]
+        return np.concatenate([np.concatenate(row, axis=1) for row in rows], axis=0).astype(object)
+
+    def _subscripted(self, e: tree.Subscripted) -> Any:
+        return self.indexed(self.value(e.array), e.subscripts)
+
+    def _outputs(self, e: tree.OutputList) -> Any:
+        raise ModelError("found a list of outputs, expected one value; it stands left of '=' and ':=' only")
+
+    def _reference(self, e: tree.ComponentReference) -> Any:
+        (first, subscripts), *rest = e.parts
+        if first in self.local:
+            found = self.local[first]
+            if found is None:
+                raise ModelError(f"found '{first}', which has no value yet, expected one before it is used")
+        elif self.members.has(first):
+            found = self.members.member(first)
+        elif first == "time" and not rest:
+            return time
+        else:
+            found, subscripts, rest = self._constant(e)
+        found = self.indexed(found, subscripts)
+        for name, subscripts in rest:
+            found = self.indexed(self.part(found, name), subscripts)
+        return found
+
+    def _constant(self, e: tree.ComponentReference) -> tuple[Any, tuple[tree.Expression, ...], list[Any]]:
+        """The constant to which a reference leads, its subscripts, and what follows behind it."""
+        parts = list(e.parts)
+        owner = self.scope.constant(parts[0][0])
+        if owner is not None:
+            return self._of_package(*owner, parts)
+        here = self.scope.root if parts[0][0] == "" else self.scope
+        if parts[0][0] == "":
+            parts = parts[1:]
+        found = here.first(parts[0][0])
+        if found is None:
+            name, near = parts[0][0], [*self.local, *self.members.names(), *self.scope.known_names()]
+            raise ModelError(
+                f"found the name '{name}', expected one that is declared{did_you_mean(name, near)}"
+            )
+        parts = parts[1:]
+        while parts and (inner := found.inherited_class(parts[0][0])) is not None:
+            found, parts = inner, parts[1:]
+        literals = found.literals
+        if not parts:
+            if literals is not None:
+                return (
+                    values.array([EnumerationValue(k + 1, n, found.name) for k, n in enumerate(literals)]),
+                    (),
+                    [],
+                )
+            raise ModelError(f"found the class {found.name}, expected a value")
+        name = parts[0][0]
+        if literals is not None and name in literals:
+            return EnumerationValue(literals.index(name) + 1, name, found.name), (), parts[1:]
+        if name not in found.elements:
+            known = literals or [*found.elements, *found.names()]
+            raise ModelError(f"found '{name}', which {found.name} does not have{did_you_mean(name, known)}")
+        return self._of_package(found, found.elements[name], parts)
+
+    def _of_package(
+        self, owner: ClassScope, element: Element, parts: Sequence[Any]
+    ) -> tuple[Any, Any, list[Any]]:
+        name, (subscripts, *rest) = element.declaration.name, (parts[0][1], *parts[1:])
+        if not {"constant", "parameter"} & set(element.clause.prefixes):
+            raise ModelError(
+                f"found '{name}' of {owner.name}, which lies around this class, expected a constant"
+            )
+        return self.library.package(owner).member(name), subscripts, rest
+
+    def part(self, value: Any, name: str) -> Any:
+        """A member of a component or record, or of each in a list."""
+        if isinstance(value, list):
+            return values.array([self.part(one, name) for one in value])
+        if isinstance(value, RecordValue):
+            known: Sequence[str] = [*value]
+            if name in value:
+                return value[name]
+        elif hasattr(value, "member"):
+            known = value.names()
+            if value.has(name):
+                return value.member(name)
+        else:
+            known = ()
+        raise ModelError(
+            f"found the name '{name}' behind a dot, expected a member{did_you_mean(name, known)}"
+        )
+
+    def indexed(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
+        """The elements of an array or list that subscripts choose."""
+        if not subscripts:
+            return value
+        shape = (
+            (len(value),)
+            if isinstance(value, list)
+            else np.shape(value)
+            if isinstance(value, np.ndarray)
+            else ()
+        )
+        if len(subscripts) > len(shape):
+            raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
+        places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
+        if isinstance(value, list):
+            (place,) = places
+            return value[place] if isinstance(place, int) else [value[k] for k in place]
+        for axis in reversed(range(len(places))):
+            value = np.take(value, places[axis], axis=axis)
+        return value
+
+    def places(self, subscript: tree.Expression, size: int) -> int | list[int]:
+        """Indices from 0 that a subscript chooses of so many; ModelError beyond."""
+        if isinstance(subscript, tree.Mark) and subscript.word == ":":
+            return list(range(size))
+        found = replace(self, end=size).value(subscript)
+        if isinstance(found, ca.SX) or not values.is_number(found):
+            raise ModelError(
+                "found a subscript that varies, expected one that is known when the model is translated"
+            )
+        numbers = list(found) if isinstance(found, np.ndarray) else [found]
+        wrong = next((n for n in numbers if int(n) != n or not 1 <= n <= size), None)
+        if wrong is not None:
+            raise ModelError(f"found the index {wrong}, expected 1 to {size}")
+        places = [int(n) - 1 for n in numbers]
+        return places if isinstance(found, np.ndarray) else places[0]
+
+    def _call(self, e: tree.Call) -> Any:
+        name = ".".join(part for part, _ in e.function.parts)
+        inner = replace(self, quiet=True) if name in ("noEvent", "smooth") else self
+        if e.iterators:
+            items = list(inner._iterated(e.arguments[0], e.iterators))
+            if name == "array":
+                return values.array(items)
+            return values.called(name, [np.ravel(values.array(items))], {})
+        if name == "size" and e.arguments and (shape := self._declared_shape(e.arguments[0])) is not None:
+            return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
+        if name in ("size", "ndims") and e.arguments:
+            return values.called(name, [inner.value(one) for one in e.arguments], {})
+        if name == "sample":
+            return time >= self.members.next_sample(e)
+        keyword = name in ("der", "pure", "initial")
+        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
+        found = None if keyword else start.first(first.split(".")[0])
+        arguments = [inner.value(one) for one in e.arguments]
+        named = {key: inner.value(one) for key, one in e.named}
+        if found is None and name == "pure":
+            return arguments[0]
+        name = name.removeprefix(".") if found is None or found.predefined else name
+        if "." not in name and (found is None or found.predefined):
+            return values.called(name, arguments, named)
+        return self.library.call(self.scope.find_class(name, e.at), arguments, named)
+
+    def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
+        """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
+        if not isinstance(e, tree.ComponentReference):
+            return None
+        (name, subscripts), *rest = e.parts
+        if rest or subscripts:
+            return None
+        return self.members.shape(name) if name not in self.local and self.members.has(name) else None
+
+    def _partial(self, e: tree.PartialCall) -> Any:
+        raise ModelError("found a function as an argument, which is not supported, expected a value")
+
+
+_EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
+    tree.Number: Interpreter._number,
+    tree.StringLiteral: Interpreter._literal,
+    tree.BooleanLiteral: Interpreter._boolean,
+    tree.Mark: Interpreter._mark,
+    tree.Unary: Interpreter._unary,
+    tree.Binary: Interpreter._binary,
+    tree.RangeExpression: Interpreter._range,
+    tree.Conditional: Interpreter._conditional,
+    tree.ArrayConstructor: Interpreter._array,
+    tree.Matrix: Interpreter._matrix,
+    tree.Subscripted: Interpreter._subscripted,
+    tree.OutputList: Interpreter._outputs,
+    tree.ComponentReference: Interpreter._reference,
+    tree.Call: Interpreter._call,
+    tree.PartialCall: Interpreter._partial,
+}

@@ -1,0 +1,181 @@
+"""`load_modelica`: files and folders of Modelica text as classes of the language."""
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.algorithms import called_class
+from gantrytau.modelica.elaboration.classes import class_of
+from gantrytau.modelica.elaboration.modifiers import NOTHING
+from gantrytau.modelica.elaboration.scopes import ClassScope
+from gantrytau.modelica.elaboration.structure import Structure
+from gantrytau.modelica.parser import parse, read_tree
+from gantrytau.modelica.source import SourceText
+
+PREDEFINED = """
+type Real end Real; type Integer end Integer; type Boolean end Boolean; type String end String;
+partial class ExternalObject end ExternalObject;
+type StateSelect = enumeration(never, avoid, default, prefer, always);
+type AssertionLevel = enumeration(warning, error);
+"""
+
+
+class ModelicaLibrary:
+    """Classes of Modelica text: `library["Package.Model"]` is a class as any other Model; keywords modify it."""
+
+    def __init__(self, paths: Sequence[Path], libraries: Sequence[Path]):
+        top = tree.ClassDefinition(
+            0, None, None, (), "package", "", tree.Composition(0, False, None, (), None), None
+        )
+        self.root = ClassScope(top, SourceText("Modelica", ""), None)
+        predefined = parse(SourceText("Modelica", PREDEFINED))
+        for one in predefined.classes:
+            made = ClassScope(one, predefined.source, self.root, predefined=one.kind == "type")
+            self.root.classes[one.name] = made
+        self.given: list[str] = []
+        self._packages: dict[int, Structure] = {}
+        self._classes: dict[str, type[Any]] = {}
+        for path in paths:
+            self.given += self._add(path)
+        self.root.more = lambda name: _in_folders(libraries, name, self.root)
+
+    def _add(self, path: Path) -> list[str]:
+        """The classes of a file, or of a folder that is a package or holds files."""
+        if path.is_dir() and not (path / "package.mo").is_file():
+            files = sorted([*path.glob("*.mo"), *(p.parent for p in path.glob("*/package.mo"))])
+            if not files:
+                raise ModelError(
+                    "found no Modelica file, expected a folder with package.mo or with .mo files",
+                    place=str(path),
+                )
+            return [name for file in files for name in self._add(file)]
+        found = [package_in(path, self.root)] if path.is_dir() else _in_file(path, self.root)
+        for one in found:
+            around = one.around or self.root
+            if one.definition.name in around.classes:
+                one.refuse(
+                    one.definition.at, f"found a second class {one.name}, expected one; leave one file out"
+                )
+            around.classes[one.definition.name] = one
+        return [one.name for one in found]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of the models, blocks, connectors and records in the given files."""
+        left = [self.root.find_class(name, 0) for name in self.given]
+        for one in left:
+            left += [inner for inner in one.classes.values() if inner.around is one]
+        kinds = ("model", "block", "connector", "record", "class")
+        return tuple(sorted(one.name for one in left if one.definition.kind in kinds))
+
+    def kind_of(self, name: str) -> str:
+        """The word before the name of a class: model, block, connector, ...; "" for a partial one."""
+        definition = self.root.find_class(name, 0).definition
+        return "" if "partial" in definition.prefixes else definition.kind
+
+    def __getitem__(self, name: str) -> type[Any]:
+        """The class of that full name; ModelError where there is none, or it cannot be made."""
+        if name not in self._classes:
+            scope: ClassScope | None = self.root
+            for part in name.split("."):
+                scope = scope.inherited_class(part) if scope else None
+            if scope is None:
+                raise ModelError(f"found the name '{name}', expected a class{did_you_mean(name, self.names)}")
+            if "partial" in scope.definition.prefixes:
+                scope.refuse(
+                    scope.definition.at, f"found {name}, which is partial, expected a class that extends it"
+                )
+            structure = Structure(scope, NOTHING, self)
+            structure.prepare()
+            self._classes[name] = class_of(structure)
+        return self._classes[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+    def __repr__(self) -> str:
+        return f"ModelicaLibrary({', '.join(self.names)})"
+
+    def package(self, scope: ClassScope) -> Structure:
+        """The constants of a package."""
+        return self._packages.setdefault(id(scope), Structure(scope, NOTHING, self))
+
+    def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
+        """The value of a function, or of the constructor of a record."""
+        return called_class(scope, arguments, named, self, self.package(scope))
+
+
+def load_modelica(
+    *paths: str | os.PathLike[str], libraries: Iterable[str | os.PathLike[str]] = ()
+) -> ModelicaLibrary:
+    """The classes of Modelica files and folders; their names are Modelica's own, `a[1].b`.
+
+    paths: `.mo` files, and folders of packages; libraries: folders in which packages are looked for by name when a class
+    needs them, those of MODELICAPATH too. Raises ModelError with file, line and column for what is no Modelica.
+    """
+    if not paths:
+        raise ModelError("load_modelica: found no file, expected at least one, as load_modelica('robot.mo')")
+    folders = [
+        Path(p) for p in (*libraries, *filter(None, os.environ.get("MODELICAPATH", "").split(os.pathsep)))
+    ]
+    for folder in folders:
+        if not folder.is_dir():
+            raise ModelError(
+                "found no folder of this name, expected one that holds packages",
+                place=str(folder),
+                argument="libraries",
+            )
+    return ModelicaLibrary([Path(p) for p in paths], folders)
+
+
+def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
+    """The classes of a file, within the package that it names if that is there."""
+    found = read_tree(path)
+    around = root
+    for part in (found.within or "").split(".") if found.within else ():
+        inner = around.own_class(part)
+        if inner is None:  # the package itself is not given
+            name = tree.ClassDefinition(
+                0, None, None, (), "package", part, tree.Composition(0, False, None, (), None), None
+            )
+            inner = around.classes[part] = ClassScope(name, found.source, around)
+        around = inner
+    return [ClassScope(one, found.source, around) for one in found.classes]
+
+
+def package_in(folder: Path, around: ClassScope) -> ClassScope:
+    """The package of a folder, whose classes are read when they are asked for."""
+    found = read_tree(folder / "package.mo")
+    (definition, *others) = found.classes
+    if others or definition.name != folder.name.partition(" ")[0]:
+        raise ModelError(
+            found.source.told(
+                definition.at,
+                f"found '{definition.name}' in the folder {folder.name}, expected one package of that name",
+            )
+        )
+    made = ClassScope(definition, found.source, around)
+    made.more = lambda name: _in_folder(folder, name, made)
+    return made
+
+
+def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None:
+    if (folder / name / "package.mo").is_file():
+        return package_in(folder / name, around)
+    if name != "package" and (file := folder / f"{name}.mo").is_file():
+        found = read_tree(file)
+        return ClassScope(found.classes[0], found.source, around)
+    return None
+
+
+def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassScope | None:
+    for folder in folders:
+        versions = [p for p in sorted(folder.glob(f"{name} *"), reverse=True) if (p / "package.mo").is_file()]
+        for place in [folder / name] if (folder / name / "package.mo").is_file() else versions:
+            return package_in(place, root)
+        if (found := _in_folder(folder, name, root)) is not None:
+            return found
+    return None

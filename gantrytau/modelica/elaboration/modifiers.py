@@ -1,0 +1,128 @@
+"""Modifications (Modelica 3.6, chapter 7): read from the tree, and one laid over another."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from gantrytau.modelica import tree
+
+
+@dataclass(frozen=True, eq=False)
+class Redeclared:
+    """A class or component that replaces another, and the class in which its names are looked up."""
+
+    element: tree.ClassDefinition | tree.ComponentClause
+    scope: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Modifier:
+    """What is said of a component: its value, and what is said of its members and attributes, by name.
+
+    value: an expression or a plain value, of which `scope` is the class of its names and `node` the instance, where that
+    is not the one that declares the component; path: the indices and members that choose what is meant in the value; at:
+    its offset in the text of `scope`.
+    """
+
+    value: Any = None
+    scope: Any = None
+    node: Any = None
+    each: bool = False
+    final: bool = False
+    inner: Mapping[str, "Modifier"] = field(default_factory=dict)
+    redeclared: Redeclared | None = None
+    at: int = 0
+    path: tuple[int | str, ...] = ()
+
+    @property
+    def member_clause(self) -> tree.ComponentClause | None:
+        """The clause that redeclares the component, if one does."""
+        found = self.redeclared.element if self.redeclared else None
+        return found if isinstance(found, tree.ComponentClause) else None
+
+    def of_element(self, index: int) -> "Modifier":
+        """What a modification of an array of components says of one of them."""
+        inner = {name: one if one.each else one.of_element(index) for name, one in self.inner.items()}
+        return replace(self, inner=inner, path=(*self.path, index) if self.value is not None else ())
+
+    def of_member(self, name: str) -> "Modifier | None":
+        """What is said of a member, by a modification or by the value of the whole record."""
+        inner = self.inner.get(name)
+        if self.value is None or (inner is not None and inner.value is not None):
+            return inner
+        found = replace(self, inner={}, redeclared=None, each=False, path=(*self.path, name))
+        return found if inner is None else merged(inner, found)
+
+    def seen_from(self, node: Any) -> "Modifier":
+        """The same, whose values speak of an instance."""
+        return replace(
+            self,
+            node=self.node or node,
+            inner={name: one.seen_from(node) for name, one in self.inner.items()},
+        )
+
+
+NOTHING = Modifier()
+
+
+def read_modification(
+    found: tree.Modification | None, scope: Any, each: bool = False, final: bool = False
+) -> Modifier:
+    """The modification of a declaration in a class."""
+    if found is None:
+        return replace(NOTHING, each=each, final=final)
+    inner = read_arguments(found.arguments, scope).inner
+    return Modifier(found.value, scope, None, each, final, inner, None, found.at)
+
+
+def read_arguments(arguments: tuple[tree.AnyArgument, ...] | None, scope: Any) -> Modifier:
+    """The modifications in parentheses; ModelError for a name that stands there twice."""
+    inner: dict[str, Modifier] = {}
+    for one in arguments or ():
+        if isinstance(one, tree.Omission):
+            scope.refuse(one.at, "found 'break', which is not supported, expected a modification")
+            continue
+        if isinstance(one, tree.Redeclaration):
+            name, found = _redeclaration(one, scope)
+        else:
+            name, _, rest = one.name.partition(".")
+            said = read_modification(one.modification, scope, "each" in one.prefixes, "final" in one.prefixes)
+            for part in reversed(rest.split(".") if rest else ()):
+                said = replace(NOTHING, inner={part: said}, scope=scope, at=one.at)
+            found = replace(said, at=one.at)
+        if name in inner and (found.value is not None and inner[name].value is not None):
+            scope.refuse(one.at, f"found a second modification of '{name}', expected one")
+        inner[name] = merged(found, inner[name]) if name in inner else found
+    return Modifier(inner=inner, scope=scope)
+
+
+def _redeclaration(one: tree.Redeclaration, scope: Any) -> tuple[str, Modifier]:
+    element = one.element
+    whole = Redeclared(element, scope)
+    if isinstance(element, tree.ClassDefinition):
+        return element.name, Modifier(scope=scope, redeclared=whole, at=one.at)
+    (component,) = element.components
+    said = read_modification(component.modification, scope, one.each)
+    return component.name, replace(said, scope=scope, redeclared=whole, at=one.at)
+
+
+def merged(above: Modifier, below: Modifier) -> Modifier:
+    """One modification over another, which stands further in; ModelError where the inner one is final."""
+    if below is NOTHING:
+        return above
+    if below.final and (above.value is not None or above.redeclared or above.inner):
+        above.scope.refuse(
+            above.at, "found a modification of what is declared 'final', expected none; leave it out"
+        )
+    inner = dict(below.inner)
+    for name, one in above.inner.items():
+        inner[name] = merged(one, inner[name]) if name in inner else one
+    value = above if above.value is not None else below
+    return replace(
+        value,
+        inner=inner,
+        redeclared=above.redeclared or below.redeclared,
+        final=above.final or below.final,
+        at=above.at or below.at,
+        scope=value.scope or above.scope or below.scope,
+    )

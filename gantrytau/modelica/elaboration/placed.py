@@ -1,0 +1,98 @@
+"""Instances with symbols, and values of Modelica text that are computed in them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.border.refusal import ModelError
+from gantrytau.language.declarations import Formula
+from gantrytau.language.model import Declared
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import values
+from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.statements import AbsentComponent
+from gantrytau.modelica.elaboration.structure import Structure, picked
+from gantrytau.modelica.printer import expression_written
+
+
+def sample_name(call: tree.Call) -> str:
+    """The name of the Discrete that holds the next instant of a `sample`."""
+    return f"next_sample_{call.at}"
+
+
+class PlacedMembers:
+    """An instance with symbols, whose members an expression asks for by their names."""
+
+    def __init__(self, instance: Any, structure: Structure | None = None):
+        self.instance = instance
+        self.structure = getattr(type(instance), "structure", structure)
+
+    def has(self, name: str) -> bool:
+        return name in self.names()
+
+    def names(self) -> Sequence[str]:
+        return self.structure.names() if self.structure else [*type(self.instance).members()]
+
+    def member(self, name: str) -> Any:
+        """The value of a component."""
+        one = self.structure.members[name] if self.structure else None
+        if one is not None and not one.present:
+            raise AbsentComponent(f"{name}, whose condition does not hold")
+        if one is not None and one.is_folded:
+            return self.structure.member(name) if self.structure else None
+        if one is not None and 0 in one.shape:
+            return np.empty(one.shape, dtype=object) if one.primitive else []
+        found = getattr(self.instance, name)
+        if isinstance(found, ca.SX):
+            return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
+        if isinstance(found, tuple):
+            return [PlacedMembers(each) for each in found]
+        return PlacedMembers(found) if isinstance(found, Declared) else found
+
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        return self.structure.shape(name) if self.structure else None
+
+    def is_fixed(self, expression: tree.Expression) -> bool:
+        return self.structure is not None and self.structure.is_fixed(expression)
+
+    def next_sample(self, call: tree.Call) -> Any:
+        name = sample_name(call)
+        if not hasattr(self.instance, name):
+            raise ModelError("found sample() outside of a condition of 'when', expected it there")
+        return getattr(self.instance, name)
+
+
+def _by_size(found: ca.SX) -> Any:
+    shape = () if found.numel() == 1 else found.shape if found.shape[1] > 1 else (found.shape[0],)
+    return values.from_casadi(found, shape)
+
+
+class Bound(Formula):
+    """What Modelica text says of a value, computed in the instance whose class says it."""
+
+    def __init__(self, modifier: Modifier, structure: Structure):
+        super().__init__(None)  # type: ignore[arg-type]
+        self.modifier, self.structure = modifier, structure
+
+    def evaluate(self, scope: Any) -> Any:
+        """The value where `scope` is that instance."""
+        found = self.modifier.value
+        if isinstance(found, tree.TreeNode):
+            placed = PlacedMembers(scope, self.structure)
+            try:
+                found = self.structure.interpreter(self.modifier.scope, placed).value(found)
+            except AbsentComponent as error:
+                self.modifier.scope.refuse(
+                    self.modifier.at, f"found {error}, expected a component that is there"
+                )
+        found = values.to_casadi(picked(found, self.modifier.path))
+        return float(found) if isinstance(found, bool) else found
+
+    def parts(self) -> tuple[str, tuple[Any, ...]]:
+        return repr(self), ()
+
+    def __repr__(self) -> str:
+        found = self.modifier.value
+        return expression_written(found) if isinstance(found, tree.Expression) else repr(found)

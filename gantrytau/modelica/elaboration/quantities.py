@@ -1,0 +1,147 @@
+"""Numbers, Booleans and enumerations of Modelica text as quantities of the language, and what modifies them."""
+
+from typing import Any
+
+import numpy as np
+
+from gantrytau.border.dimensions import dimension
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.border.units import known_scale
+from gantrytau.language.declarations import (
+    Discrete,
+    Flow,
+    Input,
+    Output,
+    Parameter,
+    Quantity,
+    Real,
+    StateSelect,
+)
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.placed import Bound
+from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+
+KINDS = {"flow": Flow, "input": Input, "output": Output}
+NUMBERS = ("start", "min", "max", "nominal")
+TEXTS = {"unit": "unit", "displayUnit": "display"}
+IGNORED = {"quantity", "unbounded"}
+
+
+def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Modifier | None) -> None:
+    """The declaration of a number, Boolean, text or enumeration; nothing for a constant that is no plain value."""
+    name, structure = one.name, one.owner
+    if one.is_folded:
+        if one.full.value is not None:
+            value = structure.member(name)
+            body[name] = value if isinstance(value, (bool, int, float, str)) else None
+        return
+    said = _attributes(one, one.own, structure)
+    words: dict[str, Any] = {"description": one.element.declaration.description or ""}
+    words |= {k: v for k, v in said.items() if k not in ("value", "prefer")}
+    if 0 in one.shape:
+        return
+    if len(one.shape) > 2:
+        one.element.scope.refuse(
+            one.element.declaration.at, f"found {len(one.shape)} dimensions of '{name}', expected at most two"
+        )
+    if one.is_parameter:
+        for key in ("start", "fixed"):
+            words.pop(key, None)
+        fold = _flag(one, "Evaluate")
+        body[name] = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        return
+    if held:
+        start = words.pop("start", 0.0)
+        start = Bound(before, structure) if before is not None else start
+        words.pop("fixed", None)
+        body[name] = Discrete(start, shape=one.shape, **words)
+        return
+    kind = next((made for word, made in KINDS.items() if word in one.prefixes), Real)
+    found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
+    if "value" in said:
+        found.value = said["value"]  # type: ignore[attr-defined]
+    body[name] = found
+
+
+def _flag(one: ClassMember, name: str) -> bool:
+    """Whether an annotation of a component says true."""
+    for said in one.element.declaration.annotation or ():
+        if isinstance(said, tree.Argument) and said.name == name and said.modification is not None:
+            return isinstance(value := said.modification.value, tree.BooleanLiteral) and value.value
+    return False
+
+
+def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[str, Any]:
+    """The attributes of a quantity that a modification in a class sets, by the names of the language."""
+    found: dict[str, Any] = {}
+    if said.value is not None:
+        found["value"] = Bound(said, structure)
+    for name, attribute in said.inner.items():
+        if attribute.value is None or name in IGNORED:
+            continue
+        if name in NUMBERS and not structure.is_fixed(attribute.value):
+            words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
+            attribute.scope.refuse(attribute.at, words)
+        elif name in NUMBERS:
+            found[name] = Bound(attribute, structure)
+        elif name in TEXTS:
+            found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
+            if not isinstance(text, str):
+                attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
+        elif name == "fixed":
+            value = structure.folded(attribute.seen_from(structure))
+            each = set(np.ravel(value))
+            if len(each) > 1:
+                words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
+                attribute.scope.refuse(attribute.at, words)
+            found[name] = bool(each.pop())
+        elif name == "stateSelect":
+            found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
+        else:
+            known = (*NUMBERS, *TEXTS, "fixed", "stateSelect", "quantity")
+            attribute.scope.refuse(
+                attribute.at, f"found '{name}', which {one.kind} does not have{did_you_mean(name, known)}"
+            )
+    if not _has_dimension(found.get("unit", "")):
+        found.pop("unit", None)
+    if "display" in found and not _displayed(found["display"], found.get("unit")):
+        del found["display"]
+    return found
+
+
+def _has_dimension(unit: str) -> bool:
+    """Whether a unit of text is one of SI; others are informative."""
+    try:
+        return bool(unit) and bool(dimension(unit))
+    except ModelError:
+        return False
+
+
+def _displayed(display: str, unit: str | None) -> bool:
+    try:
+        known_scale("", display, unit)
+    except ModelError:
+        return False
+    return True
+
+
+def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[str, Any]:
+    """What a modification in a class says of a component, as keywords of its class."""
+    found: dict[str, Any] = {}
+    names = [*said.inner] if said.value is None else [*child.members]
+    for name in names:
+        one = child.members.get(name)
+        inner = said.of_member(name)
+        if one is None or inner is None or not one.present:
+            continue  # a class that is redeclared, or what is not there
+        if one.primitive is None and not one.shape:
+            found[name] = keywords_of(one.children[0], inner, structure)
+        elif one.primitive is None:
+            found[name] = [keywords_of(x, inner.of_element(k), structure) for k, x in enumerate(one.children)]
+        elif not one.is_folded and 0 not in one.shape:
+            attributes = _attributes(one, inner, structure)
+            if one.is_parameter:
+                attributes = {k: v for k, v in attributes.items() if k not in ("start", "fixed")}
+            found[name] = attributes
+    return {name: one for name, one in found.items() if one}

@@ -1,0 +1,323 @@
+"""Where names are looked up (Modelica 3.6, chapter 5): classes, what they inherit and import, and what lies around them."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NoReturn
+
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
+from gantrytau.modelica.source import SourceText
+
+ELEMENT_SECTIONS = ("", "public", "protected")
+
+
+class TextError(ModelError):
+    """A ModelError with the line of a text in its message."""
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A declared component: its clause, the class that declares it, and how that class and its heirs modify it."""
+
+    clause: tree.ComponentClause
+    declaration: tree.ComponentDeclaration
+    scope: "ClassScope"
+    modifier: Modifier
+
+
+@dataclass(frozen=True, eq=False)
+class StatementSection:
+    """Equations or statements of a class, and the class in which their names are looked up."""
+
+    kind: str
+    items: tuple[tree.EquationOrStatement, ...]
+    scope: "ClassScope"
+
+
+@dataclass(eq=False)
+class ClassScope:
+    """A class as a place of names. around: the class in which it stands; replaced: its redeclared classes by name.
+
+    more: what a folder adds to a package, as a function of a name; predefined: whether it is of the language, as Real.
+    """
+
+    definition: tree.ClassDefinition
+    source: SourceText
+    around: "ClassScope | None"
+    replaced: Mapping[str, "ClassScope"] = field(default_factory=dict)
+    more: Callable[[str], "ClassScope | None"] | None = None
+    predefined: bool = False
+    busy: bool = False
+
+    def refuse(self, at: int, words: str) -> NoReturn:
+        """TextError with the line of an offset."""
+        raise TextError(self.source.told(at, words))
+
+    @cached_property
+    def literals(self) -> list[str] | None:
+        """Names of the values of an enumeration; None for another class."""
+        body = self.definition.body
+        if isinstance(body, tree.Enumeration):
+            return [one.name for one in body.literals or ()]
+        return self.bases[0][0].literals if isinstance(body, tree.ShortClass) else None
+
+    @cached_property
+    def name(self) -> str:
+        """Full name of the class, with dots."""
+        around = self.around.name if self.around else ""
+        return f"{around}.{self.definition.name}".lstrip(".")
+
+    @cached_property
+    def root(self) -> "ClassScope":
+        """The outermost scope, which holds the classes of all files."""
+        return self.around.root if self.around else self
+
+    @cached_property
+    def items(self) -> tuple[tree.Element, ...]:
+        """What the class itself declares."""
+        body = self.definition.body
+        if not isinstance(body, tree.Composition):
+            return ()
+        own = (item for s in body.sections if s.kind in ELEMENT_SECTIONS for item in s.items)
+        return tuple(i for i in own if isinstance(i, tree.Element))
+
+    @cached_property
+    def classes(self) -> dict[str, "ClassScope"]:
+        """The classes that stand in it."""
+        found = {
+            i.name: ClassScope(i, self.source, self)
+            for i in self.items
+            if isinstance(i, tree.ClassDefinition)
+        }
+        return found | {name: new for name, new in self.replaced.items() if name in found}
+
+    @cached_property
+    def declared(self) -> dict[str, Element]:
+        """The components that the class itself declares."""
+        found: dict[str, Element] = {}
+        for clause in (one for one in self.items if isinstance(one, tree.ComponentClause)):
+            for one in clause.components:
+                if one.name in found:
+                    self.refuse(
+                        one.at, f"found a second component '{one.name}' of {self.name}, expected another name"
+                    )
+                found[one.name] = Element(
+                    clause,
+                    one,
+                    self,
+                    read_modification(one.modification, self, final="final" in clause.prefixes),
+                )
+        return found
+
+    @cached_property
+    def bases(self) -> tuple[tuple["ClassScope", Modifier], ...]:
+        """The classes that it extends, with the modifications of each."""
+        if self.busy:
+            self.refuse(
+                self.definition.at, f"found {self.name} among the classes that it extends, expected no circle"
+            )
+        self.busy = True
+        try:
+            found = tuple(self._inherited())
+            for base, _ in found:
+                base.bases  # noqa: B018  (a circle is told here)
+            return found
+        finally:
+            self.busy = False
+
+    def _inherited(self) -> Iterator[tuple["ClassScope", Modifier]]:
+        body = self.definition.body
+        if isinstance(body, tree.ShortClass):
+            yield self._base(body.type, body.at, body.arguments)
+        elif isinstance(body, tree.Composition) and body.extends:
+            self.refuse(
+                self.definition.at,
+                "found 'class extends', which is not supported, expected 'redeclare model A = B' or a class of its own",
+            )
+        for item in self.items:
+            if isinstance(item, tree.Extends):
+                yield self._base(item.type, item.at, item.arguments)
+
+    def _base(
+        self, name: str, at: int, arguments: tuple[tree.AnyArgument, ...] | None
+    ) -> tuple["ClassScope", Modifier]:
+        start = self.around if isinstance(self.definition.body, tree.ShortClass) and self.around else self
+        base = start.find_class(name, at, inherited=False)
+        modifier = read_arguments(arguments, start)
+        own = {n: one for n, one in self.classes.items() if "redeclare" in one.definition.prefixes}
+        return base.redeclared(modifier).with_replaced({**own, **self.replaced}), modifier
+
+    def with_replaced(self, classes: Mapping[str, "ClassScope"]) -> "ClassScope":
+        """The class with others in the place of those that it holds or inherits under these names."""
+        if not classes:
+            return self
+        return ClassScope(self.definition, self.source, self.around, {**self.replaced, **classes}, self.more)
+
+    def redeclared(self, modifier: Modifier) -> "ClassScope":
+        """The class as a modification that redeclares classes in it makes it."""
+        found = {}
+        for name, one in modifier.inner.items():
+            if one.redeclared is not None and isinstance(one.redeclared.element, tree.ClassDefinition):
+                scope = one.redeclared.scope
+                self._check_replaceable(name, one, scope)
+                found[name] = ClassScope(one.redeclared.element, scope.source, scope)
+        return self.with_replaced(found)
+
+    def _check_replaceable(self, name: str, one: Modifier, scope: "ClassScope") -> None:
+        old = self.inherited_class(name)
+        if old is None:
+            scope.refuse(
+                one.at,
+                f"found '{name}' redeclared, expected a class of {self.name}{did_you_mean(name, self.names())}",
+            )
+        if not {"replaceable", "redeclare"} & set(old.definition.prefixes):
+            scope.refuse(
+                one.at, f"found {old.name} redeclared, expected a class that is declared 'replaceable'"
+            )
+
+    @cached_property
+    def elements(self) -> dict[str, Element]:
+        """All components in the order of their declarations, inherited ones with their modifications."""
+        found: dict[str, Element] = {}
+        for base, modifier in self.bases:
+            for name, element in base.elements.items():
+                over = modifier.inner.get(name)
+                found[name] = element if over is None else _modified(element, over)
+            self._check_names(base, modifier)
+        for name, element in self.declared.items():
+            old = found.get(name)
+            if old is not None and "redeclare" in element.clause.prefixes:
+                element = Element(
+                    element.clause, element.declaration, self, merged(element.modifier, old.modifier)
+                )
+            found[name] = element
+        return found
+
+    def _check_names(self, base: "ClassScope", modifier: Modifier) -> None:
+        for name, one in modifier.inner.items():
+            if name not in base.elements and one.redeclared is None and not base.is_primitive:
+                self.refuse(
+                    one.at,
+                    f"found '{name}' modified, which {base.name} does not have{did_you_mean(name, base.elements)}",
+                )
+
+    @cached_property
+    def is_primitive(self) -> bool:
+        """Whether it is a number, a Boolean, a text or an enumeration, by whatever names."""
+        if self.predefined or isinstance(self.definition.body, tree.Enumeration):
+            return True
+        return len(self.bases) == 1 and self.bases[0][0].is_primitive and not self.declared
+
+    @cached_property
+    def sections(self) -> tuple[StatementSection, ...]:
+        """Equations and algorithms, those of bases first."""
+        found = [section for base, _ in self.bases for section in base.sections]
+        body = self.definition.body
+        for one in body.sections if isinstance(body, tree.Composition) else ():
+            if one.kind not in ELEMENT_SECTIONS:
+                items = tuple(i for i in one.items if not isinstance(i, tree.Element))
+                found.append(StatementSection(one.kind, items, self))
+        return tuple(found)
+
+    def names(self) -> list[str]:
+        """Names of classes and components, for messages."""
+        inherited = (name for base, _ in self.bases for name in base.names())
+        return [*dict.fromkeys((*self.classes, *self.declared, *inherited))]
+
+    def own_class(self, name: str) -> "ClassScope | None":
+        """The class of that name that stands in it."""
+        found = self.classes.get(name)
+        if found is None and self.more is not None:
+            found = self.more(name)
+            if found is not None:
+                self.classes[name] = found
+        return found
+
+    def inherited_class(self, name: str) -> "ClassScope | None":
+        """The class of that name in it or in what it extends."""
+        found = self.own_class(name)
+        return found or next((x for base, _ in self.bases if (x := base.inherited_class(name))), None)
+
+    def imports(self, name: str) -> Iterator[tuple["ClassScope", str, tree.Import]]:
+        """What imports may make of a name: a class, the name in it, and the import; those of single names first."""
+        found = [one for one in self.items if isinstance(one, tree.Import)]
+        for item in sorted(found, key=lambda one: one.names == ("*",)):
+            package, _, last = item.name.rpartition(".")
+            if item.names is not None and (name in item.names or item.names == ("*",)):
+                yield self.root.find_class(item.name, item.at), name, item
+            elif item.names is None and name == (item.alias or last):
+                yield self.root.find_class(package, item.at) if package else self.root, last, item
+
+    def imported(self, name: str) -> "ClassScope | None":
+        """The class that an import makes of a name."""
+        for owner, inner, item in self.imports(name):
+            found = owner.inherited_class(inner)
+            if found is not None:
+                return found
+            if item.names != ("*",) and inner not in owner.elements:
+                self.refuse(
+                    item.at,
+                    f"found '{inner}', which {owner.name} does not have{did_you_mean(inner, owner.names())}",
+                )
+        return None
+
+    def first(self, name: str, inherited: bool = True) -> "ClassScope | None":
+        """The class that a simple name means here or further out."""
+        here: ClassScope | None = self
+        while here is not None:
+            found = here.own_class(name) or here.imported(name)
+            if found is None and (inherited or here is not self) and not here.busy:
+                found = here.inherited_class(name)
+            if found is not None:
+                return found
+            here = here.root if "encapsulated" in here.definition.prefixes and here.around else here.around
+        return None
+
+    def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
+        """The component that a simple name means in a class around this one, and that class."""
+        here: ClassScope | None = self
+        while here is not None:
+            for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
+                if inner in owner.elements:
+                    return owner, owner.elements[inner]
+            here = here.around
+        return None
+
+    def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
+        """The class that a name with dots means; ModelError with the line of an offset where there is none."""
+        first, *rest = name.split(".")
+        start = self.root if first == "" else self
+        if first == "":
+            first, *rest = rest
+        found = start.first(first, inherited)
+        if found is None:
+            near = start.known_names()
+            hint = did_you_mean(first, near) if near else "."
+            self.refuse(
+                at,
+                f"found '{name}', expected the name of a class{hint} A library is given by its folder, libraries=",
+            )
+        for part in rest:
+            inner = found.inherited_class(part)
+            if inner is None:
+                self.refuse(
+                    at,
+                    f"found '{name}', but {found.name} has no class '{part}'{did_you_mean(part, found.names())}",
+                )
+            found = inner
+        return found
+
+    def known_names(self) -> list[str]:
+        """Names of classes that can be said here, for messages."""
+        here: ClassScope | None = self
+        found: list[str] = []
+        while here is not None:
+            found += [*here.classes]
+            here = here.around
+        return [*dict.fromkeys(found)]
+
+
+def _modified(element: Element, over: Modifier) -> Element:
+    return Element(element.clause, element.declaration, element.scope, merged(over, element.modifier))

@@ -1,0 +1,265 @@
+"""Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, TypeGuard, cast
+
+import casadi as ca
+import numpy as np
+
+from gantrytau.border.refusal import ModelError
+from gantrytau.language.events import Happening, WhenChain, reinit, terminate
+from gantrytau.language.functions import if_else, logic_not, logic_or
+from gantrytau.language.statements import connect, require
+from gantrytau.language.symbols import pre, time
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import values
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
+from gantrytau.modelica.elaboration.scopes import TextError
+from gantrytau.modelica.elaboration.structure import nodes_of
+
+Items = Sequence[tree.EquationOrStatement]
+
+
+class AbsentComponent(Exception):
+    """A component whose condition does not hold stands in an expression."""
+
+
+def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
+    """The statements of a section of equations, one after another; TextError with the line of what is wrong."""
+    for item in items:
+        try:
+            yield from _stated_one(item, reader)
+        except TextError:
+            raise
+        except ModelError as error:
+            reader.scope.refuse(item.at, str(error))
+
+
+def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
+    if remembers(item):
+        for left, right in sides(item, reader):
+            off = Happening(logic_not(right), (left == 0,), initially=True)
+            yield WhenChain((Happening(right, (left == 1,), initially=True), off))
+    elif isinstance(item, tree.SimpleEquation):
+        for left, right in sides(item, reader):
+            yield left == right
+    elif isinstance(item, tree.ConnectEquation):
+        yield from _connections(item, reader)
+    elif isinstance(item, tree.ForLoop):
+        for inner in looped(item, reader):
+            yield from stated(item.items, inner)
+    elif isinstance(item, tree.Branching) and item.word == "when":
+        yield WhenChain(tuple(_when(item, reader)))
+        for call in (call for test, _ in item.branches for call in sample_calls(test)):
+            instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
+            yield WhenChain(
+                (Happening(time >= instant, (instant == pre(instant) + period,), "sample", True),)
+            )
+    elif isinstance(item, tree.Branching):
+        yield from _branches(item, reader)
+    elif isinstance(item, tree.ProcedureCall):
+        yield from _call(item, reader)
+    else:
+        raise ModelError("found a statement among equations, expected an equation")
+
+
+def first_valued(item: tree.EquationOrStatement) -> str:
+    """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
+    left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
+    if isinstance(left, tree.Call) and _is_call(left, "pre"):
+        (left,) = left.arguments
+    return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
+
+
+def remembers(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation outside of `when` that asks for values before, as a switch with hysteresis does."""
+    if not isinstance(item, tree.SimpleEquation) or not isinstance(item.left, tree.ComponentReference):
+        return False
+    names = (call.function.parts[0][0] for call in nodes_of(item.right) if isinstance(call, tree.Call))
+    return any(name in ("pre", "edge", "change") for name in names)
+
+
+def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
+    """What reads the body of a loop, once for each value of its iterators."""
+    readers = [reader]
+    for name, over in item.iterators:
+        readers = [inner.with_local(**{name: one}) for inner in readers for one in inner.steps(over)]
+    yield from readers
+
+
+def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any, Any]]:
+    """The two sides of an equation as the language compares them; several for records and lists of outputs."""
+    right = reader.results(item.right)
+    if isinstance(item.left, tree.OutputList):
+        if not isinstance(right, tuple):
+            raise ModelError(
+                "found one value right of a list of outputs, expected a function with several results"
+            )
+        if len(item.left.items) > len(right):
+            raise ModelError(f"found {len(item.left.items)} outputs, expected at most {len(right)}")
+        pairs = [(reader.value(a), b) for a, b in zip(item.left.items, right, strict=False) if a is not None]
+    else:
+        pairs = [(reader.value(item.left), first_result(right))]
+    for a, b in pairs:
+        yield from _pairs(a, b)
+
+
+def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
+    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        for one, other in zip(a, b, strict=True):
+            yield from _pairs(one, other)
+        return
+    if hasattr(a, "member") or isinstance(a, values.RecordValue):
+        names: Iterable[str] = [*a] if isinstance(a, values.RecordValue) else cast(Members, a).names()
+        for name in names:
+            yield from _pairs(_member(a, name), _member(b, name))
+        return
+    if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
+        raise ModelError(
+            f"found the sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
+        )
+    if isinstance(a, np.ndarray) and not a.size:
+        return
+    left, right = values.to_casadi(a), values.to_casadi(b)
+    if not isinstance(left, ca.SX) and not isinstance(right, ca.SX):
+        if not np.allclose(np.array(left, float), np.array(right, float), rtol=0, atol=0):
+            raise ModelError(
+                f"found {left} = {right}, which never holds, expected an equation with a variable"
+            )
+        return
+    yield ca.SX(left), ca.SX(right)
+
+
+def _member(value: Any, name: str) -> Any:
+    return value[name] if isinstance(value, values.RecordValue) else value.member(name)
+
+
+def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[Any]:
+    try:
+        a, b = reader.value(item.a), reader.value(item.b)
+    except AbsentComponent:
+        return
+    for one, other in _ends(a, b):
+        yield connect(one, other)
+
+
+def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
+    many = [isinstance(x, list) for x in (a, b)]
+    if any(many):
+        if not all(many) or len(a) != len(b):
+            sizes = [f"[{len(x)}]" if isinstance(x, list) else "of a scalar" for x in (a, b)]
+            raise ModelError(f"found connectors of the sizes {' and '.join(sizes)}, expected one size")
+        for one, other in zip(a, b, strict=True):
+            yield from _ends(one, other)
+        return
+    found = [getattr(x, "instance", None) if hasattr(x, "member") else values.to_casadi(x) for x in (a, b)]
+    if any(x is None or isinstance(x, (bool, int, float, str)) for x in found):
+        raise ModelError("found what is no connector in connect(), expected two connectors")
+    yield found[0], found[1]
+
+
+def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
+    """An `if` among equations: what is known chooses, else the sides are chosen at all times."""
+    tests: list[tuple[Any, Items]] = []
+    last: Items = item.otherwise or ()
+    for test, items in item.branches:
+        known = values.tested(reader.value(test))
+        if isinstance(known, ca.SX):
+            tests.append((known, items))
+        elif known:
+            last = items
+            break
+    if not tests:
+        yield from stated(last, reader)
+        return
+    found = _differences(last, reader)
+    for test, items in reversed(tests):
+        above = _differences(items, reader)
+        if len(above) != len(found):
+            raise ModelError(
+                f"found {len(above)} and {len(found)} equations in the branches of an 'if' whose condition varies, "
+                "expected as many in each"
+            )
+        found = [if_else(values.condition(test), a, b) for a, b in zip(above, found, strict=True)]
+    for one in found:
+        yield one == 0
+
+
+def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
+    """The scalar equations of a branch as differences of their sides."""
+    found: list[ca.SX] = []
+    for one in stated(items, reader):
+        if not isinstance(one, ca.SX):
+            raise ModelError(
+                "found connect, when or assert where the condition of 'if' varies, expected equations only"
+            )
+        found += [e.dep(0) - e.dep(1) for e in one.elements()]
+    return found
+
+
+def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
+    name = item.call.function.parts[-1][0]
+    if name != "assert":
+        raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")
+    arguments = dict(zip(("condition", "message", "level"), item.call.arguments, strict=False)) | dict(
+        item.call.named
+    )
+    level = reader.value(arguments["level"]) if "level" in arguments else 2
+    holds, words = reader.value(arguments["condition"]), reader.value(arguments["message"])
+    if level != 2:
+        return  # a warning
+    if isinstance(holds, ca.SX):
+        if reader.members.is_fixed(arguments["condition"]):
+            yield require(holds, words)
+        else:
+            yield WhenChain((Happening(logic_not(values.condition(holds)), (), words, True, words),))
+    elif not holds:
+        raise ModelError(f"found an assertion that does not hold: {words}")
+
+
+def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
+    for test, items in item.branches:
+        conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
+        initially = any(_is_call(one, "initial") for one in conditions)
+        found = [reader.value(one) for one in conditions if not _is_call(one, "initial")]
+        sampled = any(sample_calls(test))
+        if not found:
+            raise ModelError("found 'when initial()', expected an initial equation, or a start value")
+        words = "" if not sampled else "sample"
+        joined = logic_or(*map(values.condition, found)) if len(found) > 1 else values.condition(found[0])
+        yield Happening(joined, tuple(_actions(items, reader)), words, initially or sampled)
+
+
+def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
+    """The calls of `sample` in a condition of `when`."""
+    left = [test]
+    for one in left:
+        if isinstance(one, tree.Call) and _is_call(one, "sample") and len(one.arguments) == 2:
+            yield one
+        elif isinstance(one, tree.ArrayConstructor):
+            left += one.items
+        elif isinstance(one, tree.Binary):
+            left += [one.left, one.right]
+
+
+def _is_call(e: tree.Expression, name: str) -> bool:
+    return isinstance(e, tree.Call) and e.function.parts[0][0] == name
+
+
+def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
+    for item in items:
+        if isinstance(item, tree.SimpleEquation):
+            for left, right in sides(item, reader):
+                yield left == right
+        elif isinstance(item, tree.ForLoop):
+            for inner in looped(item, reader):
+                yield from _actions(item.items, inner)
+        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "reinit":
+            variable, value = (reader.value(one) for one in item.call.arguments)
+            yield reinit(values.to_casadi(variable), values.to_casadi(value))
+        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "terminate":
+            yield terminate(reader.value(item.call.arguments[0]))
+        else:
+            reader.scope.refuse(
+                item.at, "found what is no equation, reinit or terminate in 'when', expected one of these"
+            )

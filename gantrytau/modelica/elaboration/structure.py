@@ -1,0 +1,370 @@
+"""What an instance of a class consists of, before there are symbols: members, sizes, conditions, redeclared classes.
+
+A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gantrytau.border.refusal import ModelError, did_you_mean
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
+from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element
+from gantrytau.modelica.elaboration.values import RecordValue, is_number
+
+
+def picked(value: Any, path: Sequence[int | str]) -> Any:
+    """The part of a value that indices and names of members choose."""
+    for step in path:
+        if isinstance(step, str):
+            value = value[step] if isinstance(value, RecordValue) else value.member(step)
+        elif isinstance(value, (list, np.ndarray)) and step < len(value):
+            value = value[step]
+        else:
+            many = isinstance(value, (list, np.ndarray))
+            raise ModelError(
+                f"found {f'{len(value)} values' if many else 'a scalar'} for an array of components, expected one value for "
+                "each; 'each' before the name takes one value for all"
+            )
+    return value
+
+
+@dataclass(eq=False)
+class Structure:
+    """An instance of a class: modifier says what is said of it from outside, whose values know their own instances.
+
+    read: names of the parameters that shape it; folding: those whose values are asked for at the moment;
+    started: initial equations that are start values of what a `when` sets.
+    """
+
+    scope: ClassScope
+    modifier: Modifier
+    beyond: Surroundings
+    path: str = ""
+    prefixes: frozenset[str] = frozenset()  # parameter or constant, of the record as a whole
+    around: "Structure | None" = None
+    read: set[str] = field(default_factory=set)
+    folding: list[str] = field(default_factory=list)
+    started: list[Any] = field(default_factory=list)
+
+    @cached_property
+    def members(self) -> dict[str, "ClassMember"]:
+        """Its components by name, also those that are absent."""
+        for name, one in self.modifier.inner.items():
+            redeclares_class = one.redeclared is not None and one.member_clause is None
+            if name not in self.scope.elements and not redeclares_class and one.scope is not None:
+                hint = did_you_mean(name, self.scope.elements)
+                one.scope.refuse(
+                    one.at, f"found '{name}' modified, which {self.scope.name} does not have{hint}"
+                )
+        return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
+
+    def has(self, name: str) -> bool:
+        return name in self.scope.elements
+
+    def names(self) -> Sequence[str]:
+        return [*self.scope.elements]
+
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        return self.members[name].shape
+
+    def next_sample(self, call: tree.Call) -> Any:
+        raise ModelError("found sample() outside of a condition of 'when', expected it there")
+
+    def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
+        """What evaluates expressions of a class in this instance."""
+        return Interpreter(scope, members or self, self.beyond)
+
+    def folded(self, modifier: Modifier) -> Any:
+        """The value of a modification."""
+        found = modifier.value
+        if isinstance(found, tree.TreeNode):
+            found = self.interpreter(modifier.scope, modifier.node).value(found)
+        return picked(found, modifier.path)
+
+    def member(self, name: str) -> Any:
+        """The value of a constant or parameter that shapes the model, or the structure of a component."""
+        one = self.members[name]
+        if one.primitive is None:
+            return one.children if one.shape else one.children[0]
+        if not one.is_parameter:
+            raise ModelError(
+                f"found '{name}', a variable, expected what is known when the model is translated"
+            )
+        if one.full.value is None:
+            raise ModelError(
+                f"found '{name}', which has no value, expected one, as it shapes {self.scope.name}; give {name} = ..."
+            )
+        if name in self.folding:
+            raise ModelError(f"found '{name}', whose value needs itself, expected values one after another")
+        self.read.add(name)
+        self.folding.append(name)
+        try:
+            found = self.folded(one.full)
+        finally:
+            self.folding.remove(name)
+        if not is_number(found):
+            raise ModelError(
+                f"found the value of '{name}' to vary, expected what is known when the model is translated"
+            )
+        if one.kind == "Real" and isinstance(found, int) and not isinstance(found, bool):
+            return float(found)
+        return (
+            int(found)
+            if one.kind == "Integer" and isinstance(found, float) and found == int(found)
+            else found
+        )
+
+    def prepare(self) -> None:
+        """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""
+        for one in self.members.values():
+            one.full  # noqa: B018  (what is final is told here)
+            if one.present and one.shape is not None:
+                for child in one.children if "outer" not in one.prefixes else ():
+                    child.prepare()
+        for section in self.scope.sections:
+            for item in section.items:
+                self._ask(item, section.scope, frozenset())
+
+    def _ask(self, item: tree.EquationOrStatement, scope: ClassScope, local: frozenset[str]) -> None:
+        inside: list[tree.EquationOrStatement] = []
+        if isinstance(item, tree.ForLoop):
+            for name, over in item.iterators:
+                self._ask_names(over, scope, local)
+                local |= {name}
+            inside += item.items
+        elif isinstance(item, tree.Branching):
+            for test, items in item.branches:
+                if item.word == "if":
+                    self._ask_names(test, scope, local)
+                inside += items
+            inside += item.otherwise or ()
+        for one in inside:
+            self._ask(one, scope, local)
+
+    def _ask_names(self, expression: Any, scope: ClassScope, local: frozenset[str]) -> None:
+        """Fold the parameters in an expression, unless a variable stands in it, too."""
+        found = [one for one in references(expression) if one.parts[0][0] not in local]
+        if all(map(self._is_known, found)):
+            for one in found:
+                whole = tuple((name, ()) for name, _ in one.parts)
+                self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
+
+    def is_fixed(self, expression: Any) -> bool:
+        return all(map(self._is_known, references(expression)))
+
+    def _is_known(self, reference: tree.ComponentReference) -> bool:
+        """Whether a reference leads to a parameter or constant."""
+        here: Structure = self
+        for name, _ in reference.parts:
+            if not here.has(name):
+                return here is self and name != "time"
+            one = here.members[name]
+            if one.primitive is not None:
+                return one.is_parameter
+            if not one.children:
+                break
+            here = one.children[0]
+        return True
+
+
+def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
+    """An expression and all that is in it; not the names of functions."""
+    if isinstance(expression, tree.Call):
+        yield expression
+        yield from nodes_of((expression.arguments, expression.named))
+    elif isinstance(expression, (tuple, list)):
+        for one in expression:
+            yield from nodes_of(one)
+    elif isinstance(expression, tree.TreeNode):
+        yield expression
+        for name in type(expression).__slots__:
+            yield from nodes_of(getattr(expression, name))
+
+
+def references(expression: Any) -> list[tree.ComponentReference]:
+    """The references in an expression, but for names of functions."""
+    return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
+
+
+@dataclass(eq=False)
+class ClassMember:
+    """A component of an instance. kind: Real, Integer, Boolean, String, or an enumeration; "" for a class."""
+
+    name: str
+    element: Element
+    owner: Structure
+
+    @cached_property
+    def over(self) -> Modifier:
+        """What is said of it from outside of its instance."""
+        return self.owner.modifier.of_member(self.name) or NOTHING
+
+    @cached_property
+    def clause(self) -> tuple[tree.ComponentClause, ClassScope]:
+        """The clause that gives its type, and the class of the names in it."""
+        for said in (self.over, self.element.modifier):
+            found = said.member_clause
+            if found is not None and said.redeclared is not None:
+                if not {"replaceable", "redeclare"} & set(self.element.clause.prefixes):
+                    said.redeclared.scope.refuse(
+                        said.at, f"found '{self.name}' redeclared, expected what is declared 'replaceable'"
+                    )
+                return found, said.redeclared.scope
+        return self.element.clause, self.element.scope
+
+    @cached_property
+    def plain_type(self) -> ClassScope:
+        """Its class, without what is redeclared in it."""
+        clause, scope = self.clause
+        return scope.find_class(clause.type, clause.at)
+
+    @cached_property
+    def own(self) -> Modifier:
+        """What its own class and declaration say of it."""
+        said = self.element.modifier
+        constraint = self.element.clause.constraint
+        if constraint is not None:
+            said = merged(said, read_arguments(constraint.arguments, self.element.scope))
+        for one in self.chain:
+            for _, modifier in one.bases:
+                said = merged(said, modifier)
+        return said
+
+    @cached_property
+    def full(self) -> Modifier:
+        """All that is said of it."""
+        return merged(self.over, self.own.seen_from(self.owner))
+
+    @cached_property
+    def chain(self) -> list[ClassScope]:
+        """The classes from its type to a number, Boolean, text or enumeration; none for another class."""
+        found, here = [], self.plain_type
+        while here.is_primitive:
+            found.append(here)
+            if not here.bases:
+                break
+            here = here.bases[0][0]
+        return found
+
+    @property
+    def primitive(self) -> ClassScope | None:
+        """The class of the language that it is in the end; None for another class."""
+        return self.chain[-1] if self.chain else None
+
+    @property
+    def kind(self) -> str:
+        return "" if self.primitive is None else self.primitive.definition.name
+
+    @cached_property
+    def prefixes(self) -> set[str]:
+        """Words before its type, those of the names of its type among them."""
+        bodies = (one.definition.body for one in self.chain)
+        found = {word for body in bodies if isinstance(body, tree.ShortClass) for word in body.prefixes}
+        return found | {*self.element.clause.prefixes, *self.clause[0].prefixes, *self.owner.prefixes}
+
+    @property
+    def is_parameter(self) -> bool:
+        return bool({"parameter", "constant"} & self.prefixes) or self.kind == "String"
+
+    @property
+    def is_folded(self) -> bool:
+        """Whether its value is no symbol: a constant, a text, or what shapes the model."""
+        return (
+            "constant" in self.prefixes
+            or self.kind == "String"
+            or (self.name in self.owner.read and self.is_parameter)
+        )
+
+    @cached_property
+    def present(self) -> bool:
+        """Whether its condition holds."""
+        condition = self.element.declaration.condition
+        if condition is None:
+            return True
+        found = self.owner.interpreter(self.element.scope).value(condition)
+        if not isinstance(found, bool):
+            self.element.scope.refuse(condition.at, f"found {found!r} as a condition, expected true or false")
+        return found
+
+    @cached_property
+    def shape(self) -> tuple[int, ...]:
+        """Its sizes."""
+        clause, scope = self.clause
+        sizes = [(s, self.element.scope) for s in self.element.declaration.subscripts]
+        if clause is not self.element.clause:
+            sizes = [(s, scope) for s in clause.components[0].subscripts] or sizes
+        sizes += [(s, scope) for s in clause.subscripts]
+        for one in self.chain:
+            body = one.definition.body
+            sizes += [(s, one) for s in body.subscripts] if isinstance(body, tree.ShortClass) else []
+        return tuple(self._size(size, scope, k) for k, (size, scope) in enumerate(sizes))
+
+    def _size(self, size: tree.Expression, scope: ClassScope, dimension: int) -> int:
+        if isinstance(size, tree.Mark) and size.word == ":":
+            if self.full.value is None:
+                scope.refuse(
+                    size.at,
+                    f"found ':' as a size of '{self.name}' without a value, expected a value or a size",
+                )
+            before = set(self.owner.read)
+            found = np.shape(self.owner.folded(self.full))
+            self.owner.read.intersection_update(before)
+            return found[dimension]
+        found = self.owner.interpreter(scope).value(size)
+        if isinstance(found, bool) or not isinstance(found, int) or found < 0:
+            scope.refuse(
+                size.at,
+                f"found {found!r} as a size of '{self.name}', expected a whole number of zero or more",
+            )
+        return found
+
+    @cached_property
+    def children(self) -> list[Structure]:
+        """The structures of its elements, one for a scalar; none for what has no members."""
+        if self.primitive is not None:
+            return []
+        if (meant := self._inner()) is not None:
+            return meant.children
+        clause, scope = self.clause
+        if len(self.shape) > 1:
+            scope.refuse(
+                clause.at, f"found an array of components of {len(self.shape)} dimensions, expected one"
+            )
+        kind = self.plain_type.redeclared(self.full)
+        if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
+            scope.refuse(
+                clause.at,
+                f"found a component of {kind.name}, which is partial, expected a class that extends it",
+            )
+        path = f"{self.owner.path}.{self.name}".lstrip(".")
+        said = [self.full.of_element(k) for k in range(self.shape[0])] if self.shape else [self.full]
+        prefixes = frozenset({"parameter", "constant"} & self.prefixes)
+        around = self.owner
+        while around is not None:
+            if around.scope.definition is kind.definition:
+                scope.refuse(
+                    clause.at, f"found a component of {kind.name} within itself, expected another class"
+                )
+            around = around.around
+        return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
+
+    def _inner(self) -> "ClassMember | None":
+        """The component that an `outer` means."""
+        around = self.owner.around if "outer" in self.prefixes and "inner" not in self.prefixes else None
+        while around is not None:
+            if around.has(self.name) and "inner" in around.members[self.name].prefixes:
+                return around.members[self.name]
+            around = around.around
+        return None
+
+
+def plain(values: Mapping[str, Any]) -> Modifier:
+    """Modifications by plain values, nested as mappings."""
+    inner = {n: plain(v) if isinstance(v, Mapping) else Modifier(value=v) for n, v in values.items()}
+    return Modifier(inner=inner)
