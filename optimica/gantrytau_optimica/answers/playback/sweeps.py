@@ -7,6 +7,7 @@ resolve it is told by the highest of them.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -100,13 +101,36 @@ class Sweeps:
             x[open_ones], last[open_ones] = moved[halved], change[halved]
         return Swept(x, kept, settled, rough, inverse)
 
-    def values(self, function: ca.Function, *arguments: np.ndarray) -> np.ndarray:
+    def values(self, function: ca.Function, x: np.ndarray, kept: np.ndarray, p: np.ndarray) -> np.ndarray:
         """A function of x, kept and p at all places of pieces, (n, 17, k)."""
-        x, kept, p = arguments
-        columns = (
-            one.reshape(PLACES.size * len(x), one.shape[-1]).T
-            for one in (x, kept, np.repeat(p, PLACES.size, axis=0))
-        )
-        found = np.array(function(np.tile(PLACES, len(x))[None, :], *columns))
+        if len(x) == 1:
+            return self._one_piece[function.name()](PLACES[:, None], x[0], kept[0], p)[None]
+        every = np.tile(PLACES, len(x))[:, None], x, kept, np.repeat(p, PLACES.size, axis=0)
+        columns = (one.reshape(PLACES.size * len(x), one.shape[-1]).T for one in every)
+        found = np.array(function(*columns))
         rows = found.reshape(function.size1_out(0), len(x), PLACES.size, function.size2_out(0))
         return rows.transpose(1, 2, 3, 0).reshape(len(x), PLACES.size, rows.shape[0] * rows.shape[3])
+
+    @cached_property
+    def _one_piece(self) -> dict[str, "InPlace"]:
+        return {one.name(): InPlace(one) for one in (self.rates, self.residuals, self.matrix)}
+
+
+class InPlace:
+    """A function at the places of one piece, on arrays that CasADi reads and writes in place."""
+
+    def __init__(self, function: ca.Function):
+        whole = function.map(PLACES.size)
+        self.arguments = [np.zeros((PLACES.size, function.size1_in(i))) for i in range(function.n_in())]
+        self.result = np.zeros((PLACES.size, function.numel_out(0)))
+        self.buffer, self.evaluate = whole.buffer()
+        for i, argument in enumerate(self.arguments):
+            self.buffer.set_arg(i, argument.data)
+        self.buffer.set_res(0, self.result.data)
+
+    def __call__(self, *arguments: np.ndarray) -> np.ndarray:
+        """The result, overwritten by the next call; one row of an argument stands for all places."""
+        for own, argument in zip(self.arguments, arguments, strict=True):
+            own[:] = argument
+        self.evaluate()
+        return self.result
