@@ -119,7 +119,7 @@ def replay(built: Built, trajectory: Trajectory) -> Replayed:
             x[k:], kept[k:], complete = np.nan, np.nan, False
             break
         local[k], state = end - after[k], x[k][-1]
-    z = system.sweeps.values(system.algebraics, x, kept, p)
+    z = system.sweeps.values(system.sweeps.algebraics, x, kept, p)
     z[np.isnan(x[:, -1]).any(axis=1)] = np.nan
     return Replayed(trajectory, pieces, x, z, local, complete)
 
@@ -182,12 +182,9 @@ def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """The equations over a piece, in closed form but for algebraics that are kept; algebraics: (place, x, kept z, p) ->
-    all of them; dae: for an integrator, in scaled states.
-    """
+    """The equations over a piece, in closed form but for algebraics that are kept; dae: for an integrator, in scaled states."""
 
     sweeps: Sweeps
-    algebraics: ca.Function
     dae: dict[str, ca.SX]
 
     @cached_property
@@ -257,15 +254,12 @@ def _system(built: Built, trajectory: Trajectory, pieces: int) -> _System:
     sizes = np.array([s.nominal for s in phase.states])
     scaled, none = ca.SX.sym("scaled", x.numel()), [ca.SX(0, 1), ca.SX(0, 0)]
     residual, matrix = residuals or none
+    results = dict(rates=rates, residuals=residual, matrix=matrix, algebraics=algebraics)
     sweeps = Sweeps(
-        function("rates", rates),
-        function("residuals", residual),
-        function("matrix", matrix),
-        np.array(kept, int),
-        sizes,
+        **{name: function(name, one) for name, one in results.items()}, kept=np.array(kept, int), sizes=sizes
     )
     at_kept = residual[kept] if kept else residual
     ode, at_kept = ca.substitute([rates / sizes, at_kept], [x], [scaled * sizes])
     dae = {"t": place, "x": scaled, "p": p, "ode": ca.densify(ode)}
     dae |= {"z": z, "alg": ca.densify(at_kept)} if kept else {}
-    return _System(sweeps, function("algebraics", algebraics), dae)
+    return _System(sweeps, dae)

@@ -54,13 +54,14 @@ class Swept:
 class Sweeps:
     """The equations of a phase over a piece, as functions of (place, x, kept z, p).
 
-    rates: of states by the place; residuals, matrix: all residuals and their Jacobian by all algebraics, which have their
-    closed forms where they are not `kept`; sizes: of states.
+    rates: of states by the place; residuals, matrix: all residuals and their Jacobian by all algebraics; algebraics: all of
+    them, by closed forms where they are not `kept`; sizes: of states.
     """
 
     rates: ca.Function
     residuals: ca.Function
     matrix: ca.Function
+    algebraics: ca.Function
     kept: np.ndarray
     sizes: np.ndarray
 
@@ -113,7 +114,9 @@ class Sweeps:
 
     @cached_property
     def _one_piece(self) -> dict[str, "InPlace"]:
-        return {one.name(): InPlace(one) for one in (self.rates, self.residuals, self.matrix)}
+        return {
+            one.name(): InPlace(one) for one in (self.rates, self.residuals, self.matrix, self.algebraics)
+        }
 
 
 class InPlace:
