@@ -182,7 +182,7 @@ def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """The equations over a piece, in closed form but for algebraics that are kept; dae: for an integrator, in scaled states."""
+    """The equations over a piece, in closed form but for algebraics that are kept; dae: for an integrator."""
 
     sweeps: Sweeps
     dae: dict[str, ca.SX]
