@@ -13,6 +13,7 @@ from gantrytau.progress import shows_progress
 from gantrytau_optimica.answers.archive.run_record import require_place, write_record
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.control.build import build
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.controls import read_controls
 from gantrytau_optimica.control.input_rates import with_ramped_rates
 from gantrytau_optimica.failures.dependence import check_freedom
@@ -129,7 +130,7 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     begin = time.perf_counter()
     near, guess = solution_given(policy.guess), read_guesses(policy.guess, read)
     held = [n for name in names(parameters) for n in parameter_names(read, name)]
-    built = build(read, guess, held, read_controls(read, policy.controls or {}), policy.causality)
+    built = _built(read, guess, held, policy)
     if one_point(read):  # a static problem: one element, one point
         policy = replace(
             policy, elements=1, points=1, scheme="radau", lengths="given", controls=None, refine=None
@@ -146,3 +147,14 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
     return Prepared(
         built, program, solver, guess, time.perf_counter() - begin, policy.refine, policy.starts, near
     )
+
+
+def _built(read: SymbolicProblem, guess: Mapping[str, Any], held: Sequence[str], policy: Policy) -> Built:
+    """The problem in the form that is transcribed, kept with the model where nothing but the problem decides on it."""
+    controls = read_controls(read, policy.controls or {})
+    if guess or controls or read.courses or read.links:
+        return build(read, guess, held, controls, policy.causality)
+    made, key = read.dae.made, ("built", *held, policy.causality)
+    if key not in made or not made[key].read.says_the_same(read):
+        made[key] = build(read, guess, held, controls, policy.causality)
+    return made[key]

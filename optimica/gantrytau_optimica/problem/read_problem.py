@@ -20,11 +20,14 @@ from gantrytau.language.functions import Between
 from gantrytau.language.instructions import refuse_calls
 from gantrytau.language.symbols import writing
 from gantrytau.simulation.signals import read_signals
+from gantrytau_optimica.problem.kept_reading import content_of, keep_reading, kept_reading
 from gantrytau_optimica.problem.model_words import relation_text
 from gantrytau_optimica.problem.optimization import (
     Free,
     Optimization,
     PhaseLink,
+    Point,
+    Target,
     initial,
     reading,
 )
@@ -81,27 +84,50 @@ def read_problem(
             )
     constraints = [*(c for c in found if isinstance(c, ConstraintRow)), *starts]
     mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
+    links = tuple(_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink))
+    given = _given(stages, flat)
+    said = flat, given, mentioned, objective, phases, constraints, asked.points, asked.targets
+    content = content_of(name, *said)
+    read = kept_reading(content)
+    if read is None:
+        read = _checked(name, *said, instance, guess)
+        if read.dae.flat is flat:  # nothing else decided on it, as starts by first guesses
+            keep_reading(content, read)
+    read = check_objective(replace(read, links=links, courses=_courses(name, stages, read.dae)))
+    check_times(read)
+    return read
+
+
+def _checked(
+    name: str,
+    flat: FlatModel,
+    given: Sequence[str],
+    mentioned: Sequence[str],
+    objective: ca.SX,
+    phases: tuple[SymbolicPhase, ...],
+    constraints: Sequence[ConstraintRow],
+    points: Sequence[Point],
+    targets: Sequence[Target],
+    instance: Instance,
+    guess: Any,
+) -> SymbolicProblem:
+    """What is said of a problem, checked, with its model translated; links and courses are still missing."""
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
-    for one in (*asked.points, *asked.targets):
+    for one in (*points, *targets):
         refuse_calls(str(one.symbol), one.expression)
-    check_constraints(constraints, asked.targets)
-    check_problem_units(replace(flat, derivatives=derivatives), constraints, asked.points, times)
+    check_constraints(constraints, targets)
+    check_problem_units(replace(flat, derivatives=derivatives), constraints, points, times)
     dae = _translated(
         flat,
-        _given(stages, flat),
+        given,
         mentioned,
-        partial(with_told_starts, flat, constraints, asked.points, guess),
+        partial(with_told_starts, flat, constraints, points, guess),
     )
-    links = [_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink)]
-    read = SymbolicProblem(
-        name, dae, objective, phases, tuple(constraints), tuple(links), tuple(asked.points), tuple(asked.targets),
-        _courses(name, stages, dae),
-    )  # fmt: skip
-    read = check_objective(read)
-    check_times(read)
-    return read
+    return SymbolicProblem(
+        name, dae, objective, phases, tuple(constraints), (), tuple(points), tuple(targets), {}
+    )
 
 
 def _translated(

@@ -61,6 +61,11 @@ class SymbolicProblem:
     targets: tuple[Target, ...]
     courses: Mapping[str, ca.SX | tuple[Samples, int]]
 
+    def says_the_same(self, other: "SymbolicProblem") -> bool:
+        """Whether another one has the same records, links and courses aside."""
+        names = "name", "dae", "objective", "phases", "constraints", "points", "targets"
+        return all(getattr(self, name) is getattr(other, name) for name in names)
+
     def phase_of(self, expression: ca.SX, what: str) -> int:
         """Number of the phase whose variables an expression holds. Raises ModelError if they are of several."""
         if len(self.phases) == 1:

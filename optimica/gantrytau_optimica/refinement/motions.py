@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from gantrytau_optimica.answers.optimum import Optimum
-from gantrytau_optimica.answers.playback.replay import INTEGRALS, PLACES
+from gantrytau_optimica.answers.playback.sweeps import INTEGRALS, PLACES
 from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
 from gantrytau_optimica.refinement.remesh import divided
 from gantrytau_optimica.transcription.program import Program, first_guess

@@ -3,7 +3,8 @@
 import numpy as np
 
 from gantrytau_optimica.answers.playback.ranges import measured
-from gantrytau_optimica.answers.playback.replay import PLACES, Replayed
+from gantrytau_optimica.answers.playback.replay import Replayed
+from gantrytau_optimica.answers.playback.sweeps import PLACES
 from gantrytau_optimica.answers.playback.switches import input_range, sides, switches
 from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.transcription.mesh import Mesh

@@ -116,7 +116,7 @@ class Solver:
 
     def __init__(self, program: Program, settings: SolverSettings):
         assembled = program.assembled
-        self.settings = settings
+        self.settings, self.program = settings, program
         options = {
             "print_time": False,
             "show_eval_warnings": False,
@@ -137,16 +137,20 @@ class Solver:
         }
         if settings.loops:
             options["ipopt"]["mumps_pivtol"] = LEAST_PIVOT
-        options["ipopt"]["obj_scaling_factor"] = _objective_scale(program, FEW if settings.firm else 1.0)
         options |= {"grad_f": assembled.grad_f, "jac_g": assembled.jac_g, "hess_lag": assembled.hess_lag}
         self.nlp, self.options = assembled.nlp, options
-        self._make(assembled.variables, assembled.rows)
+        self.watch: Watch | None = None
 
-    def _make(self, variables: int, rows: int) -> None:
-        """Ipopt and its watch, anew where a solve was left that still uses the old ones."""
-        self.watch = Watch(variables, rows)
-        options = self.options | {"iteration_callback": self.watch}
-        self.nlpsol = ca.nlpsol("optimum", "ipopt", self.nlp, options)
+    def _watched(self) -> Watch:
+        """Of Ipopt, both made for the first solve, and anew where one was left that still uses the old ones."""
+        if self.watch is None or self.watch.left:
+            assembled = self.program.assembled
+            scale = _objective_scale(self.program, FEW if self.settings.firm else 1.0)
+            self.watch = Watch(assembled.variables, assembled.rows)
+            options = self.options | {"iteration_callback": self.watch}
+            options["ipopt"] = options["ipopt"] | {"obj_scaling_factor": scale}
+            self.nlpsol = ca.nlpsol("optimum", "ipopt", self.nlp, options)
+        return self.watch
 
     def unsolved(self, program: Program, guess: np.ndarray) -> Solution:
         """The guess as a solution that was not looked for, because there is none."""
@@ -173,9 +177,7 @@ class Solver:
         first = pushed(program, guess)
         if not finite(program, first):
             return replace(self.unsolved(program, first), status=NOT_BEGUN)
-        if self.watch.left:
-            self._make(program.assembled.variables, program.assembled.rows)
-        watch, scale = self.watch, program.places.scale
+        watch, scale = self._watched(), program.places.scale
         watch.begin(clock or Clock(self.settings.max_time, self.settings.progress))
         limits = dict(lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg)
         found: Mapping[str, Any] | None = attended(self.nlpsol, watch, dict(x0=guess / scale, **limits))
@@ -192,7 +194,7 @@ class Solver:
             word = "Maximum_WallTime_Exceeded"
         status = WORDS.get(word, word.replace("_", " ").lower())
         if not found:  # left before its first iteration
-            return self._ended(replace(self.unsolved(program, first), status=status), begin)
+            return _ended(replace(self.unsolved(program, first), status=status), watch, begin)
         moved = np.abs(np.array(found["x"]).ravel() - first / scale)
         if word.startswith("Maximum") and np.max(moved, initial=0.0) > FAR:
             status = WORDS["Diverging_Iterates"]
@@ -208,14 +210,15 @@ class Solver:
             iterations=int(stats["iter_count"]),
             solve_time=0.0,
         )
-        return self._ended(solution, begin)
+        return _ended(solution, watch, begin)
 
-    def _ended(self, solution: Solution, begin: float) -> Solution:
-        """The solution with its time; raises Pressed with it if Ctrl-C was."""
-        solution = replace(solution, solve_time=time.perf_counter() - begin)
-        if self.watch.pressed:
-            raise Pressed(solution)
-        return solution
+
+def _ended(solution: Solution, watch: Watch, begin: float) -> Solution:
+    """The solution with its time; raises Pressed with it if Ctrl-C was."""
+    solution = replace(solution, solve_time=time.perf_counter() - begin)
+    if watch.pressed:
+        raise Pressed(solution)
+    return solution
 
 
 def pushed(program: Program, guess: np.ndarray) -> np.ndarray:

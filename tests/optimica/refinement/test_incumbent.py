@@ -112,7 +112,7 @@ def test_wherever_it_comes_a_solution_is_kept(monkeypatch, module, name):
 
 def test_before_anything_is_found_it_is_an_interruption_like_any_other(monkeypatch):
     module = sys.modules["gantrytau_optimica.optimize"]
-    monkeypatch.setattr(module, "build", lambda *a: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr(module, "transcribe", lambda *a: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         optimize(FastestMass)
 

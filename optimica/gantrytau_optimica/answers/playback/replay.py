@@ -2,10 +2,8 @@
 
     dx/ds = h f(t0 + h s, x, z, u(s)),  0 = g(...),  0 <= s <= 1        on every piece between two borders
 
-Inputs are the polynomials of the solution, so a piece is smooth. CVODES or IDAS begins anew on each, so that their errors
-add up over pieces, and an unstable plant makes them grow: so what 17 places resolve is polished there by sweeps of Picard,
-
-    x(s) <- x(0) + h int_0^s f(x) ds        whose errors fall by a factor of h |df/dx|, to rounding
+Inputs are the polynomials of the solution, so a piece is smooth: where 17 places resolve it, sweeps of Picard from the
+solution lead to rounding. Elsewhere CVODES or IDAS begins anew on each piece, so that their errors add up.
 """
 
 from dataclasses import dataclass
@@ -15,16 +13,14 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.describing.record import Record
+from gantrytau.kernels import kernel
+from gantrytau_optimica.answers.playback.sweeps import INTEGRALS, PLACES, Sweeps, Swept
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.transcription.layout import lagrange, polynomials
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
-AGREED = 1e-6  # of its size: by how much a first sweep may change a state
-RESOLVED = 1e-12  # of its size: what the highest polynomials have of the rate of a state
 TOLERANCE = 1e-10
-PLACES = 0.5 - 0.5 * np.cos(
-    np.pi * np.arange(17) / 16
-)  # Chebyshev's extremes: interpolation between them converges
+SWEEPS = 20  # of a piece, that are expected
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,50 +87,40 @@ class Replayed(Record):
         return np.einsum("mpk,k,p->m", rows, INTEGRALS[-1], np.diff(self.pieces, axis=1)[:, 0])
 
 
-def _partial_integrals(places: np.ndarray) -> np.ndarray:
-    """Weights (n, n) of the integrals from 0 to each place, exact for polynomials through the places."""
-    primitives = np.polynomial.legendre.legint(np.eye(places.size), lbnd=-1, axis=0)
-    return (np.polynomial.legendre.legval(2 * places - 1, primitives).T / 2) @ _transform(places)
-
-
-def _transform(places: np.ndarray) -> np.ndarray:
-    """From values at places to shares of the polynomials of Legendre, (n, n)."""
-    return np.linalg.inv(np.polynomial.legendre.legvander(2 * places - 1, places.size - 1))
-
-
-INTEGRALS, HIGHEST = _partial_integrals(PLACES), _transform(PLACES)[-2:]
-
-
 def replay(built: Built, trajectory: Trajectory) -> Replayed:
     """Integrate a phase with the inputs of the solution, from the solution's start."""
     phase = trajectory.phase
     pieces, owner = _pieces(trajectory)
     if not phase.states:
         return _unmoved(trajectory, pieces)
-    system = _system(built, trajectory)
-    nodes = _nodes(trajectory)
-    courses = _course_values(trajectory, pieces, nodes)  # (k, n, m)
-    numbers = trajectory.numbers
-    sizes = np.array([s.nominal for s in phase.states])
+    courses = _course_values(trajectory, pieces, _nodes(trajectory))  # (k, n, m)
+    numbers = np.tile(trajectory.numbers, (len(pieces), 1))
+    p = np.hstack(
+        [courses.transpose(1, 0, 2).reshape(len(pieces), -1), pieces[:, :1], np.diff(pieces), numbers]
+    )
     starts = trajectory.signals(pieces[:, 0])[: len(phase.states)].T
     first = np.array([trajectory.w[trajectory.layout.starts[e]] for e in owner])
     on_border = np.concatenate([[True], owner[1:] != owner[:-1]])
     starts = np.where(on_border[:, None], first, starts)
     after = np.vstack([starts[1:], trajectory.w[trajectory.layout.starts[-1]][None, :]])
-    guesses = _algebraics(trajectory, pieces)
-    x = np.zeros((len(pieces), PLACES.size, len(phase.states)))
-    z = np.zeros((len(pieces), PLACES.size, len(phase.algebraics)))
+    system = _system(built, trajectory, len(pieces))
+    own = system.along(trajectory, pieces, owner, starts, p)
+    x, kept = np.full_like(own.x, np.nan), np.full_like(own.kept, np.nan)
     local = np.full((len(pieces), len(phase.states)), np.nan)
+    guesses = _algebraics(trajectory, pieces)[:, system.sweeps.kept]
     state, complete = starts[0], True
-    for k, (begin, end) in enumerate(pieces):
-        p = np.concatenate([courses[:, k].ravel(), [begin, end - begin], numbers])
+    for k in range(len(pieces)):
         try:
-            x[k], z[k] = system.run(state, guesses[k], p, sizes)
-            local[k] = system.run(starts[k], guesses[k], p, sizes)[0][-1] - after[k]
+            x[k], kept[k] = system.moved(state, own, k, guesses[k], p[k])
+            end = own.x[k, -1]
+            if not own.settled[k]:
+                end = system.integrated(starts[k], guesses[k], p[k], bool(own.rough[k]))[0][-1]
         except RuntimeError:  # the integrator gave up: what follows is unknown
-            x[k:], z[k:], complete = np.nan, np.nan, False
+            x[k:], kept[k:], complete = np.nan, np.nan, False
             break
-        state = x[k][-1]
+        local[k], state = end - after[k], x[k][-1]
+    z = system.sweeps.values(system.sweeps.algebraics, x, kept, p)
+    z[np.isnan(x[:, -1]).any(axis=1)] = np.nan
     return Replayed(trajectory, pieces, x, z, local, complete)
 
 
@@ -196,55 +182,58 @@ def _algebraics(trajectory: Trajectory, pieces: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _System:
-    """An integrator over a piece, and what it leaves out."""
+    """The equations over a piece, in closed form but for algebraics that are kept; dae: for an integrator."""
 
-    integrator: ca.Function
-    kept: np.ndarray  # numbers of the algebraics that the integrator solves for
-    equations: (
-        ca.Function
-    )  # (place, x, kept z, p) -> all algebraics, rates by the place, residuals, their Jacobian by z
+    sweeps: Sweeps
+    dae: dict[str, ca.SX]
 
-    def run(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, sizes: np.ndarray):
-        """States (17, nx) and algebraics (17, nz) at Chebyshev places. Raises RuntimeError where it gets stuck."""
-        found = self.integrator(x0=state / sizes, z0=guess[self.kept], p=p)
-        x = np.array(found["xf"]).reshape(state.size, PLACES.size) * sizes[:, None]
+    @cached_property
+    def integrator(self) -> ca.Function:
+        """CVODES or IDAS, made where sweeps do not do."""
+        options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 1000}
+        options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
+        method = "idas" if self.sweeps.kept.size else "cvodes"
+        return ca.integrator("replay", method, self.dae, 0.0, PLACES.tolist(), options)
+
+    def along(
+        self, trajectory: Trajectory, pieces: np.ndarray, owner: np.ndarray, starts: np.ndarray, p: np.ndarray
+    ) -> Swept:
+        """All pieces from the solution, each from its own start."""
+        nx, borders = starts.shape[1], trajectory.times(trajectory.mesh.borders)
+        times = pieces[:, :1] + np.diff(pieces, axis=1) * PLACES
+        inside = (times - borders[owner][:, None]) / np.diff(borders)[owner][:, None]
+        found = trajectory.at(np.repeat(owner, PLACES.size), inside.ravel(), times.ravel())
+        found = found.T.reshape(*times.shape, -1)
+        x = found[..., :nx] + (starts - found[:, 0, :nx])[:, None]
+        return self.sweeps.from_guess(x, found[..., nx + self.sweeps.kept], p)
+
+    def moved(self, state: np.ndarray, own: Swept, k: int, guess: np.ndarray, p: np.ndarray):
+        """States and kept algebraics of piece k from a state, near its `own` motion; RuntimeError where it gets stuck."""
+        if own.settled[k]:
+            beside = own.x[k] + (state - own.x[k, 0])
+            found = self.sweeps.swept(beside[None], own.kept[k : k + 1], own.inverse[k : k + 1], p[None])
+            if found.settled[0]:
+                return found.x[0], found.kept[0]
+        return self.integrated(state, guess, p, bool(own.rough[k]))
+
+    def integrated(self, state: np.ndarray, guess: np.ndarray, p: np.ndarray, rough: bool):
+        """The same by an integrator, and by sweeps from its answer, unless the piece is too rough for them."""
+        sizes = self.sweeps.sizes
+        found = self.integrator(x0=state / sizes, z0=guess, p=p)
+        x = np.array(found["xf"]).reshape(state.size, PLACES.size).T * sizes
         if not np.all(np.isfinite(x)):
             raise RuntimeError("not finite")
-        kept = np.array(found["zf"]).reshape(self.kept.size, PLACES.size)
-        x, kept = self._polished(x, kept, p, sizes[:, None])
-        return x.T, self._values(x, kept, p)[0].T
-
-    def _values(self, x: np.ndarray, kept: np.ndarray, p: np.ndarray) -> list[np.ndarray]:
-        return [np.array(one) for one in self.equations(PLACES[None, :], x, kept, p)]
-
-    def _polished(self, x: np.ndarray, kept: np.ndarray, p: np.ndarray, sizes: np.ndarray):
-        """States and algebraics after sweeps that change states ever less, each with a step of Newton's method for the
-        algebraics; as they were where the places do not resolve the rates.
-        """
-        begun, last = (x, kept), AGREED
-        while True:
-            if kept.size:
-                _, _, residuals, jacobian = self._values(x, kept, p)
-                matrices = jacobian.reshape(kept.shape[0], PLACES.size, kept.shape[0]).swapaxes(0, 1)
-                try:
-                    kept = kept - np.linalg.solve(matrices, residuals.T[..., None])[..., 0].T
-                except np.linalg.LinAlgError:  # singular at one of the places
-                    return begun
-            rates = self._values(x, kept, p)[1]
-            swept = x[:, :1] + rates @ INTEGRALS.T
-            change = float(np.max(np.abs(swept - x) / sizes))
-            if not change < last / 2:
-                resolved = np.max(np.abs(rates @ HIGHEST.T) / sizes) < RESOLVED
-                return (x, kept) if resolved else begun
-            x, last = swept, change
+        kept = np.array(found["zf"]).reshape(guess.size, PLACES.size).T
+        swept = None if rough else self.sweeps.from_guess(x[None], kept[None], p[None])
+        return (swept.x[0], swept.kept[0]) if swept is not None and swept.settled[0] else (x, kept)
 
 
-def _system(built: Built, trajectory: Trajectory) -> _System:
+def _system(built: Built, trajectory: Trajectory, pieces: int) -> _System:
     phase, problem = trajectory.phase, trajectory.problem
-    symbols = [s.symbol for s in phase.algebraics]
+    every = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.algebraics))
     kept = [i for i, a in enumerate(phase.algebraics) if a.name not in built.closed]
-    everything = [phase.ode, phase.residuals[kept], ca.vertcat(ca.SX(0, 1), *symbols)]
-    everything = built.in_closed_form(phase, [ca.densify(one) for one in everything])
+    parts = [phase.ode, phase.residuals, ca.jacobian(phase.residuals, every), every]
+    parts = built.in_closed_form(phase, [ca.densify(one) for one in (parts if kept else [phase.ode, every])])
     place, begin, span = ca.SX.sym("place"), ca.SX.sym("begin"), ca.SX.sym("span")
     nodes = _nodes(trajectory)
     inputs = [*(s.symbol for s in phase.inputs), *(c.symbol for c in phase.courses)]
@@ -252,20 +241,25 @@ def _system(built: Built, trajectory: Trajectory) -> _System:
     basis = polynomials(nodes, place)
     courses = [ca.dot(basis, values[nodes.size * i : nodes.size * (i + 1)]) for i in range(len(inputs))]
     old, new = ca.vertcat(problem.time, *inputs), ca.vertcat(begin + place * span, *courses)
-    ode, residuals, algebraics = ca.substitute(everything, [old], [new])
-    nominal = ca.DM([s.nominal for s in phase.states])
+    ode, *residuals, algebraics = ca.substitute(parts, [old], [new])
     x = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.states))
-    z = ca.vertcat(ca.SX(0, 1), *(symbols[i] for i in kept))
-    p = ca.vertcat(values, begin, span, problem.numbers)
-    scaled = ca.SX.sym("scaled", x.numel())
-    rates, jacobian = ode * span, ca.jacobian(residuals, z)
-    equations = [ca.densify(one) for one in (algebraics, rates, residuals, jacobian)]
-    ode, residuals = ca.substitute([rates / nominal, residuals], [x], [scaled * nominal])
-    dae = {"t": place, "x": scaled, "z": z, "p": p, "ode": ca.densify(ode), "alg": ca.densify(residuals)}
-    options = {"reltol": TOLERANCE, "abstol": TOLERANCE, "max_num_steps": 1000}
-    options |= {"show_eval_warnings": False, "disable_internal_warnings": True}
-    if not kept:
-        del dae["z"], dae["alg"]
-    method = "idas" if kept else "cvodes"
-    integrator = ca.integrator("replay", method, dae, 0.0, PLACES.tolist(), options)
-    return _System(integrator, np.array(kept, int), ca.Function("equations", [place, x, z, p], equations))
+    z, p = every[kept], ca.vertcat(values, begin, span, problem.numbers)
+    rates = ode * span
+    calls = SWEEPS * PLACES.size * pieces
+
+    def function(name: str, result: ca.SX) -> ca.Function:
+        made = ca.Function(name, [place, x, z, p], [ca.densify(result)], {"cse": True})
+        return kernel(made, calls) if trajectory.layout.scheme.compiled else made
+
+    sizes = np.array([s.nominal for s in phase.states])
+    scaled, none = ca.SX.sym("scaled", x.numel()), [ca.SX(0, 1), ca.SX(0, 0)]
+    residual, matrix = residuals or none
+    results = dict(rates=rates, residuals=residual, matrix=matrix, algebraics=algebraics)
+    sweeps = Sweeps(
+        **{name: function(name, one) for name, one in results.items()}, kept=np.array(kept, int), sizes=sizes
+    )
+    at_kept = residual[kept] if kept else residual
+    ode, at_kept = ca.substitute([rates / sizes, at_kept], [x], [scaled * sizes])
+    dae = {"t": place, "x": scaled, "p": p, "ode": ca.densify(ode)}
+    dae |= {"z": z, "alg": ca.densify(at_kept)} if kept else {}
+    return _System(sweeps, dae)

@@ -45,16 +45,26 @@ def values_at_ends(
 
 
 def _following(dae: Dae, given: Mapping[str, float], known: set[str]) -> dict[str, float]:
-    """States that are not known, with their rates, by symbol, as they follow from values at the same time; or {}."""
+    """States that are not known, with their rates, by symbol, as they follow from values at the same time; or {}.
+
+    Kept with the model: guesses of other durations have the same ends.
+    """
     states = {alias.symbol for n in dae.states if (alias := dae.root(n)) is not None}
     missing = states - known
     if not missing or known <= states:
         return {}
+    key = "following", tuple(given.items()), frozenset(known)
+    if key not in dae.made:
+        names = [*missing, *(f"der({n})" for n in states if f"der({n})" not in known)]
+        dae.made[key] = _completed(dae, given, names)
+    return dae.made[key]
+
+
+def _completed(dae: Dae, given: Mapping[str, float], names: Sequence[str]) -> dict[str, float]:
     try:
         point = dae.evaluate(given)
     except (InitializationError, StructureError):
         return {}  # told when the problem is solved
-    names = [*missing, *(f"der({n})" for n in states if f"der({n})" not in known)]
     found = {name: float(point[name]) for name in names if name in point}
     return {name: 0.0 if abs(x) < ROUNDING else x for name, x in found.items()}
 
