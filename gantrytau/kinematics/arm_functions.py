@@ -20,6 +20,7 @@ from gantrytau.kinematics.model_functions import MOVES, ModelFunctions, independ
 
 # places from which a pose is led, before it is out of reach: of 10,000 random ones all are found
 NEIGHBOURS = 12
+BETWEEN = 64  # places of a way of the joints that are looked at
 ROUNDS = (32, 64, 128, 256, 512)  # places by which the branch is grown
 
 
@@ -135,15 +136,30 @@ class ArmFunctions(ModelFunctions):
     @cached_property
     def _grown(self) -> GrownBranch:
         """The branch of the start as far as it goes, grown by poses of joints that are drawn."""
-        lead = self._branch.beside
-        grown = GrownBranch(
-            np.concatenate([self._branch.begin, self.home.q]),
-            12,
-            lambda pose, there: lead(pose, there[:12], there[12:]),
-        )
+        grown = GrownBranch(np.concatenate([self._branch.begin, self.home.q]), 12, self._led)
         wide = np.full(len(self.joints), np.linalg.norm(self.home.r) or 1.0)
         wide[self._turns] = np.pi
         q = self.home.q + np.random.default_rng(0).uniform(-wide, wide, (sum(ROUNDS), len(wide)))
         for part in np.split(np.hstack(self._forward(*q.T)).T, np.cumsum(ROUNDS[:-1]), axis=1):
             grown(part, 1)
         return grown
+
+    def _led(self, pose: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """Joints (n, N) at poses (12, N), each from a known point (12 + n, N), by the straight way of the tool.
+
+        Where that way ends, by the straight way of the joints to any solution, if none of them is singular on it.
+        """
+        q, start = self._branch.beside(pose, there[:12], there[12:]), there[12:]
+        lost = np.flatnonzero(np.isnan(q[0]))
+        found = self._branch.jumped(pose[:, lost], start[:, lost])
+        lost, found = lost[np.isfinite(found[0])], found[:, np.isfinite(found[0])]
+        moved = found - start[:, lost]
+        moved[self._turns] = np.angle(np.exp(1j * moved[self._turns]))
+        way = start[:, lost] + np.linspace(0, 1, BETWEEN)[:, None, None] * moved
+        minor = self._minors(way.swapaxes(1, 2).reshape(-1, len(q))).reshape(BETWEEN, -1)
+        within = (
+            np.abs(minor[1:-1]) > np.abs(np.diff(minor, 2, axis=0)) / 8
+        )  # as far as a parabola bends between places
+        alike = (minor * minor[:1] > 0).all(axis=0) & within.all(axis=0)
+        q[:, lost[alike]] = way[-1][:, alike]
+        return q

@@ -103,20 +103,10 @@ def left_jacobian(w: np.ndarray) -> np.ndarray:
 
 def rotation_vector(R: np.ndarray) -> np.ndarray:
     """The rotation vector of rotation matrices, (..., 3, 3) -> (..., 3), angles from 0 to pi."""
-    axis = np.stack(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], axis=-1
-    )
-    sine = np.linalg.norm(axis, axis=-1) / 2
-    cosine = (np.trace(R, axis1=-2, axis2=-1) - 1) / 2
-    angle = np.arctan2(sine, cosine)
-    found = axis / 2 * (angle / np.where(sine < 1e-12, 1.0, sine))[..., None]
-    half_turn = (sine < 1e-6) & (cosine < 0)
-    if np.any(half_turn):  # the axis is the column of R + I that is longest
-        columns = (R + np.eye(3))[half_turn]
-        best = np.argmax(np.linalg.norm(columns, axis=-2), axis=-1)
-        axes = np.take_along_axis(columns, best[:, None, None], axis=-1)[..., 0]
-        found[half_turn] = np.pi * axes / np.linalg.norm(axes, axis=-1, keepdims=True)
-    return found
+    q = quaternions(R.reshape(-1, 3, 3))
+    sine = np.linalg.norm(q[:, 1:], axis=1)  # of half the angle
+    share = np.where(sine < SMALL, 2.0, 2.0 * np.arctan2(sine, q[:, 0]) / np.where(sine < SMALL, 1.0, sine))
+    return (share[:, None] * q[:, 1:]).reshape(R.shape[:-1])
 
 
 def told_vector(R: np.ndarray) -> np.ndarray:

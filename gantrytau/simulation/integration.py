@@ -32,6 +32,10 @@ GROWTH = 10  # of a stretch in which nothing has switched
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
 SOMETIMES = 0.1  # the same, where it starts anew at events
 SMOOTHLY = 0.02  # the same, else: the errors of all steps then add up to a few times the tolerance of a run
+USUAL, ORDER = (
+    1e-9,
+    5,
+)  # below this tolerance of a step their number grows as tolerance**(-1 / (ORDER + 1)), and errors with it
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 
@@ -61,7 +65,8 @@ class Run:
         interval = float(np.diff(self.trail.t).max())
         often = coordinates.dae.flat.sampled or coordinates.dae.flat.delays
         smooth = not (often or len(coordinates.switches) or coordinates.rounds.whens)
-        own = OFTEN if often else SMOOTHLY if smooth else SOMETIMES
+        small = min(1.0, tolerance / USUAL) ** (1 / ORDER)
+        own = OFTEN if often else SMOOTHLY * small if smooth else SOMETIMES
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.enough = tolerance if smooth else exact  # where rounding keeps the integrator from more
         self.integrators = Integrators(coordinates, exact, longest, interval)

@@ -7,6 +7,7 @@ import pytest
 
 from gantrytau import Model, ModelError, Start, connect
 from gantrytau.kinematics import Kinematics
+from gantrytau.kinematics.rotations import about, of_vectors
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
 from gantrytau_models import DeltaRobot, FiveBar
 from tests.families import NIGHTLY, first_of
@@ -15,6 +16,7 @@ from tests.references.delta import ACROSS, OUT
 
 PLACES = 10_000 if NIGHTLY else 400
 UPPER, FORE = 0.4, 0.3
+Y, Z = np.eye(3)[1:]
 JOINTS_OF = {"two bars": ["shoulder.phi", "elbow.phi"], "SCARA": ["shoulder.phi", "elbow.phi", "spindle.s"]}
 NEAR = 1e-3  # m beside the border of the workspace, where the branch turns back
 
@@ -126,15 +128,33 @@ def test_five_bars_reach_wherever_both_cranks_do(left, right):
     assert np.isnan(k.ik(np.array([[0.5, 0.5, 0.0], [-0.1, 0.05, 0.0]]))).all()
 
 
+def half_turns(count):
+    """Rotations by half a turn exactly and nearly, by none and 1e-13 rad, about axes of the world and others, (N, 3, 3)."""
+    axes = np.vstack([np.eye(3), -np.eye(3), [[1, 1, 0], [0, 1, -1], [1, 1, 1], [0.3, -0.5, 0.8]]])
+    axes = np.tile(axes / np.linalg.norm(axes, axis=1)[:, None], (count // 40, 1))
+    exact = 2 * axes[:, :, None] * axes[:, None] - np.eye(3)
+    return np.concatenate([exact, *(of_vectors(angle * axes) for angle in (np.radians(179.999), 0.0, 1e-13))])
+
+
 @pytest.mark.nightly  # some seconds to grow its branch in six coordinates
 def test_an_arm_of_six_joints_reaches_all_of_its_aspect():
-    """Random joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight."""
+    """Random joints that keep the signs of the three singular poses: over the column, elbow straight, wrist straight.
+
+    Half of the tools are turned by half a turn, or hardly at all, from the axes of the world.
+    """
     arm = Kinematics(SixJoints(), joints=JOINTS)
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (8 * PLACES, 6))
     q[:, [2, 4]] = np.abs(q[:, [2, 4]])
     q = q[0.6 * np.cos(q[:, 1]) + 0.5 * np.cos(q[:, 1] + q[:, 2]) > 0][:PLACES]
-    r, R = arm.fk(q)
-    assert np.abs(turned(arm.ik(r, R) - q)).max() < 1e-7
+    R = half_turns(PLACES // 2)
+    wrist = np.swapaxes(about(Z, q[:, 0]) @ about(Y, q[:, 1] + q[:, 2]), 1, 2)[: len(R)] @ R
+    sine = np.hypot(wrist[:, 1, 0], wrist[:, 2, 0])
+    q[: len(R), 3] = np.arctan2(wrist[:, 1, 0], -wrist[:, 2, 0])
+    q[: len(R), 4] = np.arctan2(sine, wrist[:, 0, 0])
+    q[: len(R), 5] = np.arctan2(wrist[:, 0, 1], wrist[:, 0, 2])
+    r, there = arm.fk(q)
+    assert np.abs(there[: len(R)] - R).max() < 1e-14
+    assert np.abs(turned(arm.ik(r, np.concatenate([R, there[len(R) :]])) - q)).max() < 1e-7
 
 
 def test_a_delta_robot_reaches_wherever_its_arms_do():

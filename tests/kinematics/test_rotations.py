@@ -16,7 +16,10 @@ def test_rotation_vectors_come_back():
 def test_rotation_vectors_go_back_and_forth():
     w = np.array([[0.3, -0.2, 0.9], [1e-9, 0, 0], [0, np.pi, 0], [0, 0, 0], [2.0, 1.0, -2.0]])
     R = of_vectors(w)
-    assert rotation_vector(R) == pytest.approx(w, abs=1e-8)
+    assert rotation_vector(R) == pytest.approx(w, abs=1e-14)
+    near = (np.pi - 10.0 ** -np.arange(1, 15)[:, None]) * [0.6, 0.0, -0.8]
+    near[:, 2:] *= [[1.0], [-1.0]] * 7
+    assert rotation_vector(of_vectors(near)) == pytest.approx(near, abs=1e-14)
     assert R[0] == pytest.approx(of_vector(w[0]))
 
 

@@ -80,16 +80,20 @@ class FollowedBranch:
         y[:, here] = self._corrected(z[:, here], end[:, here])
         return y
 
+    def jumped(self, end: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Y (n, N) on any branch at `end` (k, N) by Newton's method from each start (n, N); NaN where it does not end."""
+        z = start / self.units[1][:, None]
+        for _ in range(STEPS):
+            step = self._newton_by_value(z, end)
+            z += np.nan_to_num(step / np.maximum(1.0, np.abs(step).max(axis=0)))
+        return self._corrected(z, end)
+
     def solutions(self, end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """All Y (n, m) at one `end` (k,) that many starts lead to, and signs (1, m) of det df/dy, 1 as at the start."""
         turns, begin = self._turning[:, None], self.start[:, None]
         wide = np.where(turns, np.pi, np.maximum(1.0, np.abs(begin)))
-        y = begin + wide * np.random.default_rng(0).uniform(-1, 1, (len(begin), STARTS))
-        z, ends = y / self.units[1][:, None], np.repeat(end[:, None], STARTS, axis=1)
-        for _ in range(STEPS):
-            step = self._newton_by_value(z, ends)
-            z += np.nan_to_num(step / np.maximum(1.0, np.abs(step).max(axis=0)))
-        y = self._corrected(z, ends)
+        ends = np.repeat(end[:, None], STARTS, axis=1)
+        y = self.jumped(ends, begin + wide * np.random.default_rng(0).uniform(-1, 1, (len(begin), STARTS)))
         kept: list[int] = []
         for k in np.flatnonzero(np.isfinite(y[0])):
             gaps = y[:, k, None] - y[:, kept]
