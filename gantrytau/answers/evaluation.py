@@ -8,8 +8,9 @@ import numpy as np
 from gantrytau.border.refusal import InitializationError, ModelError
 from gantrytau.border.units import given as in_si
 from gantrytau.compiler.parameters import with_values
-from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.consistency import solve_levels
 from gantrytau.compiler.start.consistent_start import consistent_start
+from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues, contradicts
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate

@@ -21,7 +21,8 @@ from gantrytau.border.checks import number
 from gantrytau.border.refusal import Given, InitializationError, ModelError, StructureError, did_you_mean
 from gantrytau.compiler.parameters import with_values
 from gantrytau.compiler.request import names
-from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.consistency import solve_levels
+from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate, translate_flat, translate_model

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.compiler.blocks.solution import Block
-from gantrytau.compiler.start.consistency import newton
+from gantrytau.compiler.start.newton import newton
 from gantrytau.compiler.translated import Translated
 from gantrytau.describing.record import Record
 from gantrytau.language.symbols import split_derivative

@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.dulmage_mendelsohn import largest_sum, signature
 from gantrytau.compiler.refusals import unbalanced
-from gantrytau.compiler.start.consistency import Level
+from gantrytau.compiler.start.level import Level
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative

@@ -17,7 +17,8 @@ from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
 from gantrytau.compiler.refusals import open_loops
 from gantrytau.compiler.start.balance import balance
-from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.consistency import solve_levels
+from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues, start_values
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation

@@ -67,8 +67,27 @@ def column(elements: Sequence[ca.SX]) -> ca.SX:
     return ca.vertcat(*elements) if elements else ca.SX(0, 1)
 
 
+def called(function: ca.Function, *arguments: np.ndarray) -> list[np.ndarray]:
+    """The nonzeros of a function's results at dense arguments, written by CasADi into memory of NumPy's."""
+    memory, go = function.buffer()
+    given = [np.array(one, dtype=float).ravel() for one in arguments]  # they have to outlive the call
+    found = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+    for k, one in enumerate(given):
+        memory.set_arg(k, one.data)
+    for k, one in enumerate(found):
+        memory.set_res(k, one.data)
+    go()
+    return found
+
+
 def values_at(expression: ca.SX, point: Mapping[str, float]) -> np.ndarray:
     """The numbers of an expression where its symbols have these values, as a dense array of its shape."""
     leaves = ca.symvar(expression)
-    function = ca.Function("values", [ca.vertcat(*leaves)], [ca.densify(expression)])
-    return np.array(function(ca.DM([point[leaf.name()] for leaf in leaves]))).reshape(expression.shape)
+    function = ca.Function("values", [ca.vertcat(*leaves)], [expression])
+    (nonzeros,) = called(function, np.array([point[leaf.name()] for leaf in leaves]))
+    if expression.is_dense():
+        return nonzeros.reshape(expression.shape, order="F")
+    found = np.zeros(expression.shape)
+    rows, columns = expression.sparsity().get_triplet()
+    found[rows, columns] = nonzeros
+    return found

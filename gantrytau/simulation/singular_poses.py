@@ -21,7 +21,7 @@ import numpy as np
 
 from gantrytau.border.refusal import SolveError
 from gantrytau.compiler.start.balance import NOISE, balance
-from gantrytau.compiler.start.consistency import ROUNDING
+from gantrytau.compiler.start.level import ROUNDING
 from gantrytau.language.term_sizes import term_sizes
 from gantrytau.simulation.events.at_places import AtPlaces
 

@@ -89,8 +89,8 @@ def _factors(indexed: Indexed, points: Sequence[Mapping[str, float]]) -> np.ndar
     place = [k for k, n in enumerate(level.leaves) if n in set(level.unknowns)]
     for point in points:
         numbers = np.array([point[n] for n in level.leaves])
-        jacobian = level.jacobian(level.look(numbers)[1])
-        found.append(np.where(level.certainty(numbers) < 0, 0.0, jacobian)[:, place])
+        entries = np.where(level.certainty(numbers) < 0, 0.0, level.look(numbers)[1])
+        found.append(level.jacobian(entries)[:, place])
     matrix = np.hstack(found)
     if not np.all(np.isfinite(matrix)):
         return None

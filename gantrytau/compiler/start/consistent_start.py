@@ -8,7 +8,8 @@ import casadi as ca
 from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
-from gantrytau.compiler.start.consistency import Level, solve_levels
+from gantrytau.compiler.start.consistency import solve_levels
+from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel
