@@ -118,6 +118,13 @@ def test_circuits_and_a_motor_of_a_package_move_as_those_in_python(drive):
     same(drive["Drive.WarmMotor"](), Driven(), names, 0.2)
 
 
+def test_what_redeclares_a_component_keeps_its_constraint_alone(drive):
+    choked = drive["Drive.Choked"]
+    poles = np.array(linearize(choked()).poles, dtype=complex)
+    assert np.sum(np.abs(np.imag(poles)) > 1.0) == 2  # it swings, as there is no resistance
+    assert "resistor.R" not in gantrytau.flatten(choked()).scalars
+
+
 def test_a_parameter_that_shapes_a_chain_makes_another_chain(drive):
     longer = drive["Drive.Chain"](n=5)
     same(longer, Chain(), {f"mass[{k + 1}].s": f"mass[{k}].s" for k in range(5)}, 2.0)

@@ -227,7 +227,7 @@ class ClassMember:
     @cached_property
     def own(self) -> Modifier:
         """What its own class and declaration say of it."""
-        said = self.element.modifier
+        said = self.element.under(self.over)
         constraint = self.element.clause.constraint
         if constraint is not None:
             said = merged(said, read_arguments(constraint.arguments, self.element.scope))
