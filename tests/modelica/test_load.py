@@ -135,6 +135,9 @@ def test_a_parameter_that_shapes_a_chain_makes_another_chain(drive):
 def test_a_pendulum_and_a_ball_move_as_those_in_python(motions):
     same(motions["Motions.Pendulum"](), Swing(), {"r[1]": "x"}, 2.0)
     same(motions["Motions.Ball"](), Ball(), {"h": "h", "v": "v", "n": "n"}, 2.8)
+    assert simulate(motions["Motions.Pendulum"](side="left"), stop=0.1)["r[1]"][0] == pytest.approx(-0.3)
+    with pytest.raises(ModelError, match="found 'lefd' for 'side'; did you mean 'left'"):
+        gantrytau.flatten(motions["Motions.Pendulum"](side="lefd"))
     result = simulate(motions["Motions.Ball"]())
     assert result.ended == "enough"
     assert simulate(motions["Motions.Pendulum"]()).time[-1] == 2.0  # of the experiment
