@@ -138,6 +138,10 @@ package Drive "a small library with the models that use it"
     extends Motor(redeclare Parts.HeatingResistor resistor(R = 3), source(V = 24));
   end WarmMotor;
 
+  model Choked "with another inductor in place of the resistor"
+    extends Motor(redeclare Parts.Inductor resistor(L = 1e-2));
+  end Choked;
+
   model Rc
     parameter Real C(unit = "F") = 1e-3;
     Parts.Source source(V = 10);

@@ -118,6 +118,13 @@ def test_circuits_and_a_motor_of_a_package_move_as_those_in_python(drive):
     same(drive["Drive.WarmMotor"](), Driven(), names, 0.2)
 
 
+def test_what_redeclares_a_component_keeps_its_constraint_alone(drive):
+    choked = drive["Drive.Choked"]
+    poles = np.array(linearize(choked()).poles, dtype=complex)
+    assert np.sum(np.abs(np.imag(poles)) > 1.0) == 2  # it swings, as there is no resistance
+    assert "resistor.R" not in gantrytau.flatten(choked()).scalars
+
+
 def test_a_parameter_that_shapes_a_chain_makes_another_chain(drive):
     longer = drive["Drive.Chain"](n=5)
     same(longer, Chain(), {f"mass[{k + 1}].s": f"mass[{k}].s" for k in range(5)}, 2.0)
@@ -128,6 +135,9 @@ def test_a_parameter_that_shapes_a_chain_makes_another_chain(drive):
 def test_a_pendulum_and_a_ball_move_as_those_in_python(motions):
     same(motions["Motions.Pendulum"](), Swing(), {"r[1]": "x"}, 2.0)
     same(motions["Motions.Ball"](), Ball(), {"h": "h", "v": "v", "n": "n"}, 2.8)
+    assert simulate(motions["Motions.Pendulum"](side="left"), stop=0.1)["r[1]"][0] == pytest.approx(-0.3)
+    with pytest.raises(ModelError, match="found 'lefd' for 'side'; did you mean 'left'"):
+        gantrytau.flatten(motions["Motions.Pendulum"](side="lefd"))
     result = simulate(motions["Motions.Ball"]())
     assert result.ended == "enough"
     assert simulate(motions["Motions.Pendulum"]()).time[-1] == 2.0  # of the experiment

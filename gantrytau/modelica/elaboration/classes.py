@@ -21,6 +21,7 @@ from gantrytau.modelica.elaboration.statements import (
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
 
+CLASSES = ("model", "block", "connector", "record", "class")
 TAKEN = {
     "equations",
     "initial_equations",
@@ -142,20 +143,20 @@ def _is_connector(structure: Structure) -> bool:
 
 
 def _refuse_kind(structure: Structure) -> None:
-    definition = structure.scope.definition
-    if definition.kind in ("package", "function", "type", "operator"):
-        structure.scope.refuse(
-            definition.at,
-            f"found the {definition.kind} {structure.scope.name}, expected a model, block, connector or record",
-        )
-    if "expandable" in definition.prefixes:
-        structure.scope.refuse(
-            definition.at, "found an expandable connector, which is not supported; declare its members"
-        )
-    if isinstance(definition.body, tree.Composition) and definition.body.external is not None:
-        structure.scope.refuse(
-            definition.at, "found an external function, which is not supported, expected an algorithm"
-        )
+    definition, name = structure.scope.definition, structure.scope.name
+    streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
+    if definition.kind not in CLASSES or "operator" in definition.prefixes:
+        words = " ".join((*definition.prefixes, definition.kind))
+        found = f"the {words} {name}, expected a model, block, connector or record"
+    elif "expandable" in definition.prefixes:
+        found = "an expandable connector, which is not supported, expected one with declared members"
+    elif streams:
+        found = f"the stream variable '{streams[0]}', which is not supported, expected potentials and flows"
+    elif any(base.definition.name == "ExternalObject" for base, _ in structure.scope.bases):
+        found = f"{name}, an external object, which is not supported, expected equations"
+    else:
+        return
+    structure.scope.refuse(definition.at, f"found {found}")
 
 
 def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Modifier]]:

@@ -304,7 +304,8 @@ class Interpreter:
 
     def _call(self, e: tree.Call) -> Any:
         name = ".".join(part for part, _ in e.function.parts)
-        inner = replace(self, quiet=True) if name in ("noEvent", "smooth") else self
+        quiet = name == "noEvent" or (name == "smooth" and self.value(e.arguments[0]) > 0)
+        inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
             items = list(inner._iterated(e.arguments[0], e.iterators))
             if name == "array":

@@ -78,6 +78,8 @@ class ModelicaLibrary:
 
     def __getitem__(self, name: str) -> type[Any]:
         """The class of that full name; ModelError where there is none, or it cannot be made."""
+        if not isinstance(name, str):
+            raise ModelError(f"found {name!r}, expected the full name of a class, as 'Package.Model'")
         if name not in self._classes:
             scope: ClassScope | None = self.root
             for part in name.split("."):

@@ -26,6 +26,13 @@ class Element:
     scope: "ClassScope"
     modifier: Modifier
 
+    def under(self, over: Modifier) -> Modifier:
+        """What stays said of it under a modification; what redeclares it keeps its constraint alone, if it has one."""
+        constraint = self.clause.constraint
+        if over.member_clause is None or constraint is None:
+            return self.modifier
+        return read_arguments(constraint.arguments, self.scope)
+
 
 @dataclass(frozen=True, eq=False)
 class StatementSection:
@@ -320,4 +327,4 @@ class ClassScope:
 
 
 def _modified(element: Element, over: Modifier) -> Element:
-    return Element(element.clause, element.declaration, element.scope, merged(over, element.modifier))
+    return Element(element.clause, element.declaration, element.scope, merged(over, element.under(over)))

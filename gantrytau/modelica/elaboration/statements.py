@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.events import Happening, WhenChain, reinit, terminate
-from gantrytau.language.functions import if_else, logic_not, logic_or
+from gantrytau.language.functions import floor, if_else, logic_not, logic_or
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
@@ -17,6 +17,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, fir
 from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.elaboration.structure import nodes_of
 
+ROUNDING = 1e-6  # of a period, by which an instant may be located early
 Items = Sequence[tree.EquationOrStatement]
 
 
@@ -52,9 +53,9 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
         yield WhenChain(tuple(_when(item, reader)))
         for call in (call for test, _ in item.branches for call in sample_calls(test)):
             instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
-            yield WhenChain(
-                (Happening(time >= instant, (instant == pre(instant) + period,), "sample", True),)
-            )
+            passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
+            action = instant == pre(instant) + passed * period
+            yield WhenChain((Happening(time >= instant, (action,), "sample", True),))
     elif isinstance(item, tree.Branching):
         yield from _branches(item, reader)
     elif isinstance(item, tree.ProcedureCall):
@@ -220,14 +221,15 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
 def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
     for test, items in item.branches:
         conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-        initially = any(_is_call(one, "initial") for one in conditions)
-        found = [reader.value(one) for one in conditions if not _is_call(one, "initial")]
+        if any(_is_call(one, "initial") for one in conditions):
+            raise ModelError(
+                "found initial() in 'when', which is not supported, expected an initial equation beside it"
+            )
+        found = [reader.value(one) for one in conditions]
         sampled = any(sample_calls(test))
-        if not found:
-            raise ModelError("found 'when initial()', expected an initial equation, or a start value")
         words = "" if not sampled else "sample"
         joined = logic_or(*map(values.condition, found)) if len(found) > 1 else values.condition(found[0])
-        yield Happening(joined, tuple(_actions(items, reader)), words, initially or sampled)
+        yield Happening(joined, tuple(_actions(items, reader)), words, sampled)
 
 
 def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:

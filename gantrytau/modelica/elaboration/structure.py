@@ -15,7 +15,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.values import RecordValue, is_number
+from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue, is_number
 
 
 def picked(value: Any, path: Sequence[int | str]) -> Any:
@@ -108,6 +108,11 @@ class Structure:
             found = self.folded(one.full)
         finally:
             self.folding.remove(name)
+        if one.literals is not None and one.primitive is not None and isinstance(found, str):
+            literal = found.rpartition(".")[2]
+            if literal not in one.literals:
+                raise ModelError(f"found {found!r} for '{name}'{did_you_mean(literal, one.literals)}")
+            return EnumerationValue(one.literals.index(literal) + 1, literal, one.primitive.name)
         if not is_number(found):
             raise ModelError(
                 f"found the value of '{name}' to vary, expected what is known when the model is translated"
@@ -227,7 +232,7 @@ class ClassMember:
     @cached_property
     def own(self) -> Modifier:
         """What its own class and declaration say of it."""
-        said = self.element.modifier
+        said = self.element.under(self.over)
         constraint = self.element.clause.constraint
         if constraint is not None:
             said = merged(said, read_arguments(constraint.arguments, self.element.scope))
@@ -269,17 +274,19 @@ class ClassMember:
         return found | {*self.element.clause.prefixes, *self.clause[0].prefixes, *self.owner.prefixes}
 
     @property
+    def literals(self) -> list[str] | None:
+        """Names of the values of an enumeration; None for all else."""
+        return None if self.primitive is None else self.primitive.literals
+
+    @property
     def is_parameter(self) -> bool:
         return bool({"parameter", "constant"} & self.prefixes) or self.kind == "String"
 
     @property
     def is_folded(self) -> bool:
-        """Whether its value is no symbol: a constant, a text, or what shapes the model."""
-        return (
-            "constant" in self.prefixes
-            or self.kind == "String"
-            or (self.name in self.owner.read and self.is_parameter)
-        )
+        """Whether its value is no symbol: a constant, a text, a choice, or what shapes the model."""
+        shapes = self.name in self.owner.read or self.literals is not None
+        return "constant" in self.prefixes or self.kind == "String" or (self.is_parameter and shapes)
 
     @cached_property
     def present(self) -> bool:
