@@ -65,6 +65,7 @@ class Kernel:
         self._instructions = size if instructions is None else instructions
         quick = "-O1" if function.is_a("SXFunction") else "-O2"  # by a quarter, where there are loops
         self._level = level or (quick if size <= SMALL else "-O0")
+        self.there = False
         self._calls = 0.0
         self._next = 0.0 if size <= MOST else math.inf  # look into the cache, s
         self._key, self._folder, self._command = "", Path(), [""]
@@ -87,7 +88,7 @@ class Kernel:
         if found is None:
             self._next = max(self._next, time.monotonic() + LOOK)
             return False
-        self.function, self._next = found, math.inf
+        self.function, self.there, self._next = found, True, math.inf
         return True
 
     def _found(self, begin: bool, wait: bool) -> ca.Function | None:

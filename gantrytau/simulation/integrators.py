@@ -6,6 +6,7 @@ import signal
 from collections.abc import Iterator
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from gantrytau.kernels import Kernel
@@ -105,6 +106,15 @@ class Integrators:
         before, self.size = self.size, float(np.abs(z).max(initial=1.0))
         return self.size > before
 
+    def _count(self, integrator: ca.Function, kernels: dict[str, Kernel]) -> None:
+        """Note the steps of an integrator, and how often it called its functions."""
+        stats = integrator.stats(1)  # of the memory that `AtPlaces` has
+        self.steps = int(stats["nsteps"])
+        for name in FUNCTIONS:
+            if name not in kernels:
+                kernels[name] = Kernel(integrator.get_function(name))
+            kernels[name].called(stats[f"n_call_{name}"])
+
     def _integrate(
         self, count: int, most: int, x: np.ndarray, z: np.ndarray, p: Any, u: Any
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -117,9 +127,9 @@ class Integrators:
         kept, sizes = self.coordinates.kept, self.coordinates.sizes
         kernels = kept(("kernels of integrators", modes, sizes), dict[str, Kernel])
         functions = {name: own.function for name, own in kernels.items()}
-        own = tuple(one.class_name() for one in functions.values())
+        there = tuple(name for name, own in kernels.items() if own.there)
         integrator = kept(
-            ("integrator", count, most, modes, longest, size, tolerance, sizes, own),
+            ("integrator", count, most, modes, longest, size, tolerance, sizes, there),
             lambda: AtPlaces(
                 self.coordinates.integrator(
                     count,
@@ -138,15 +148,7 @@ class Integrators:
             far, forces, *_ = integrator(
                 *given, *(0.0 for _ in range(integrator.function.n_in() - len(given)))
             )
-        self._last, stats = (
-            integrator.function,
-            integrator.function.stats(1),
-        )  # of the memory that `AtPlaces` has
-        self.steps = int(stats["nsteps"])
-        for name in FUNCTIONS:
-            if name not in kernels:
-                kernels[name] = Kernel(self._last.get_function(name))
-            kernels[name].called(stats[f"n_call_{name}"])
+        self._count(integrator.function, kernels)
         reached = far.reshape(count, -1) * self.sizes if x.size else np.zeros((count, 0))
         if not np.all(np.isfinite(reached)):
             raise RuntimeError("the solution is not finite")

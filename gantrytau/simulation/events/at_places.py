@@ -18,6 +18,7 @@ class AtPlaces:
 
     def __init__(self, function: ca.Function):
         self.function = function
+        self._widths = [function.numel_out(k) for k in range(function.n_out())]
         self._lock = Lock()
         written = function.is_a("SXFunction") or function.is_a("MXFunction")
         self._kernel = Kernel(function) if written else None
@@ -44,23 +45,23 @@ class AtPlaces:
         least the first has a row for each place.
         """
         places = len(arguments[0])  # type: ignore[arg-type]
-        f = self.function
-        found = [np.empty((places, f.numel_out(k))) for k in range(f.n_out())]
+        found = [np.empty((places, width)) for width in self._widths]
+        rows = [a[:, None] if isinstance(a, np.ndarray) and a.ndim == 1 else a for a in arguments]
         with self._lock:
             if self._kernel is not None and self._kernel.called(places):
                 self._memories.clear()
             first = 0
             for size in SIZES:
-                last = places - (places - first) % size
-                if first < last:
-                    self._fill(size, range(first, last, size), arguments, found)
-                first = last
+                if size <= places - first:
+                    last = places - (places - first) % size
+                    self._fill(size, range(first, last, size), rows, found)
+                    first = last
         return found
 
     def _fill(
-        self, size: int, firsts: range, arguments: Sequence[np.ndarray | float], found: list[np.ndarray]
+        self, size: int, firsts: range, rows: Sequence[np.ndarray | float], found: list[np.ndarray]
     ) -> None:
-        """Results from the first places on, so many in a call."""
+        """Results from the first places on, so many in a call; rows: arguments with one for each place, or for all."""
         if size not in self._memories:
             self._memories[size] = self._memory(
                 self._kernel.function if self._kernel else self.function, size
@@ -68,9 +69,9 @@ class AtPlaces:
         given, results, go, memory = self._memories[size]
         places = len(found[0])
         varying = []
-        for own, array in zip(given, arguments, strict=True):
+        for own, array in zip(given, rows, strict=True):
             if isinstance(array, np.ndarray) and len(array) == places:
-                varying.append((own, np.reshape(array, (places, own.shape[1]))))
+                varying.append((own, array))
             else:
                 own[:] = array
         for first in firsts:
