@@ -141,7 +141,7 @@ class Solver:
         self.nlp, self.options = assembled.nlp, options
         self.watch: Watch | None = None
 
-    def _watched(self) -> Watch:
+    def watched(self) -> Watch:
         """Of Ipopt, both made for the first solve, and anew where one was left that still uses the old ones."""
         if self.watch is None or self.watch.left:
             assembled = self.program.assembled
@@ -177,7 +177,7 @@ class Solver:
         first = pushed(program, guess)
         if not finite(program, first):
             return replace(self.unsolved(program, first), status=NOT_BEGUN)
-        watch, scale = self._watched(), program.places.scale
+        watch, scale = self.watched(), program.places.scale
         watch.begin(clock or Clock(self.settings.max_time, self.settings.progress))
         limits = dict(lbx=program.lbw, ubx=program.ubw, lbg=program.lbg, ubg=program.ubg)
         found: Mapping[str, Any] | None = attended(self.nlpsol, watch, dict(x0=guess / scale, **limits))

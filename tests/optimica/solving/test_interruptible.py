@@ -146,6 +146,7 @@ def test_what_progress_raises_comes_to_the_caller():
 
 def test_what_a_solver_raises_comes_to_the_caller():
     program, solver = solver_of(10**6, 60.0)
-    solver.watch.begin(Clock(60.0))
+    watch = solver.watched()
+    watch.begin(Clock(60.0))
     with pytest.raises(Exception, match=r"shape|dimension|mismatch"):
-        attended(solver.nlpsol, solver.watch, dict(x0=np.zeros(program.places.size + 1)))
+        attended(solver.nlpsol, watch, dict(x0=np.zeros(program.places.size + 1)))

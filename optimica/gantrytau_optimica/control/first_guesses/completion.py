@@ -63,12 +63,10 @@ class Completion:
         knowns: ca.SX,
         unknowns: ca.SX,
         closed: Mapping[int, ca.SX],
-        start: np.ndarray,
     ):
         """knowns: symbols of all that is known; unknowns: as many symbols as there are residuals; closed: what gives an
-        unknown outright, by its place, as a square root; start: values of the unknowns near a solution.
+        unknown outright, by its place, as a square root.
         """
-        self.start = start
         rows, columns = ca.jacobian_sparsity(residuals, unknowns).get_triplet()
         pattern: list[list[int]] = [[] for _ in range(residuals.numel())]
         for i, j in zip(rows, columns, strict=True):
@@ -85,14 +83,14 @@ class Completion:
             )
             self.blocks.append(NewtonBlock(function, np.array(places), outright is not None))
 
-    def along(self, begin: np.ndarray, knowns: np.ndarray) -> np.ndarray:
-        """Unknowns (k, n) at values of what is known (n, m), from those at the start with what is known there, (m,).
+    def along(self, begin: np.ndarray, start: np.ndarray, knowns: np.ndarray) -> np.ndarray:
+        """Unknowns (k, n) at values of what is known (n, m), from those at the start, (k,), with what is known there, (m,).
 
         NaN from where no solution is found.
         """
-        newton = Newton(self.blocks, begin.size, self.start.size)
-        found = np.full((len(knowns), self.start.size), np.nan)
-        here, y = begin, self.start
+        newton = Newton(self.blocks, begin.size, start.size)
+        found = np.full((len(knowns), start.size), np.nan)
+        here, y = begin, start
         for k, there in enumerate(knowns):
             reached = newton.moved(here, there, y, MOST_HALVINGS)
             if reached is None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.built import Built
+from gantrytau_optimica.control.built import Built, with_values
 from gantrytau_optimica.control.control_problem import Course, Phase, Signal
 from gantrytau_optimica.control.first_guesses.completion import Completion, Driven, driven
 
@@ -126,18 +126,7 @@ class _Whole:
         fixed, chosen = ({s.name for s in part} for part in (moving.rates, (*moving.inputs, *turning)))
         unknowns = [*(a for a in phase.algebraics if a.name not in fixed), *moving.inputs, *turning]
         known = [s for s in (*phase.states, *phase.inputs, *phase.courses) if s.name not in chosen]
-        rates = ca.SX.sym("rate", len(moved))
-        completion = Completion(
-            self._numbered(ca.vertcat(phase.residuals, phase.ode[list(moved), 0] - rates)),
-            ca.vertcat(problem.time, *(s.symbol for s in (*known, *moving.rates)), rates),
-            ca.vertcat(*(s.symbol for s in unknowns)),
-            {
-                k: self._numbered(self.built.closed[s.name])
-                for k, s in enumerate(unknowns)
-                if s.is_root and s.name in self.built.closed
-            },
-            np.array([self._at_start(s, self.own) for s in unknowns]),
-        )
+        completion = self._completion(known, unknowns, moved)
         if not completion.determined:
             return None
         still = _Constant(0.0)
@@ -145,6 +134,7 @@ class _Whole:
         rates = [self.symbols[phase.states[k].symbol.name()] for k in (moved or moving.speeds)]
         return _Along(
             completion,
+            np.array([self._at_start(s, self.own) for s in unknowns]),
             tuple(unknowns),
             (*guesses, *((still,) * len(moving.rates) if moved else ())),
             tuple(rates),
@@ -153,17 +143,41 @@ class _Whole:
                     self.span[0],
                     *(self._at_start(s, {}) for s in known),
                     *(0.0 for _ in (*moving.rates, *moved)),
+                    *(n.guess for n in problem.free),
                 ]
             ),
             self.span,
         )
 
-    def _numbered(self, expression: ca.SX) -> ca.SX:
-        """An expression with the numbers of parameters and the guesses of free ones."""
-        dae, problem, numbers = self.built.read.dae, self.built.problem, self.built.numbers
-        old = ca.vertcat(*(dae.parameter_symbols[n] for n in numbers), problem.numbers)
-        values = ca.DM([*numbers.values(), *(n.guess for n in problem.free)])
-        return ca.substitute(expression, old, values) if old.numel() else expression
+    def _completion(
+        self, known: Sequence[Signal | Course], unknowns: Sequence[Signal], moved: Sequence[int]
+    ) -> Completion:
+        """What solves for these unknowns, kept with the model: guesses of other durations have the same equations."""
+        built, phase, dae = self.built, self.phase, self.built.read.dae
+        same = phase.residuals, phase.ode, built.closed, built.numbers
+        key = ("completion", phase.name, *(s.name for s in known), "", *(s.name for s in unknowns), *moved)
+        before, completion = dae.made.get(key, ((), None))
+        if completion is None or any(x is not y for x, y in zip(before, same, strict=True)):
+            rates = ca.SX.sym("rate", len(moved))
+            outright = {
+                k: built.closed[s.name]
+                for k, s in enumerate(unknowns)
+                if s.is_root and s.name in built.closed
+            }
+            forms = with_values([*outright.values()], built.read, built.numbers)
+            completion = Completion(
+                ca.vertcat(phase.residuals, phase.ode[list(moved), 0] - rates),
+                ca.vertcat(
+                    built.problem.time,
+                    *(s.symbol for s in (*known, *self.moving.rates)),
+                    rates,
+                    built.problem.numbers,
+                ),
+                ca.vertcat(*(s.symbol for s in unknowns)),
+                dict(zip(outright, forms, strict=True)),
+            )
+            dae.made[key] = same, completion
+        return completion
 
     def _at_start(self, signal: Signal | Course, own: Mapping[str, Guess]) -> float:
         """A value near which the model starts."""
@@ -197,10 +211,12 @@ class _GuessedRate:
 class _Along:
     """All unknowns along the guess; remembers the last answers, for which their parts ask one after another.
 
-    known: guesses of what is known; speeds: those whose derivatives are known; begin: all that where the model starts.
+    start: unknowns near a solution; known: guesses of what is known; speeds: guesses whose derivatives are known;
+    begin: values of what is known where the model starts, free numbers last.
     """
 
     completion: Completion
+    start: np.ndarray
     unknowns: tuple[Signal, ...]
     known: tuple[Guess, ...]
     speeds: tuple[Guess, ...]
@@ -233,11 +249,12 @@ class _Along:
         start, stop = self.span
         rows = [start + (stop - start) * shares, *(guess(shares) for guess in self.known)]
         rows += [_GuessedRate(guess, stop - start)(shares) for guess in self.speeds]
-        values = self.completion.along(self.begin, np.array(rows, dtype=float).T)
+        rows += [np.full(shares.size, number) for number in self.begin[len(rows) :]]
+        values = self.completion.along(self.begin, self.start, np.array(rows, dtype=float).T)
         lost = np.isnan(values).any(axis=1)
         if np.any(lost):
             first = int(np.argmax(lost))
-            values[first:] = values[first - 1] if first else self.completion.start
+            values[first:] = values[first - 1] if first else self.start
         found = np.empty_like(values)
         found[order] = values
         return found
