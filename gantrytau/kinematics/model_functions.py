@@ -1,8 +1,8 @@
 """Kinematics of any model from its own equations, where no closed form is known: functions between joints and pose.
 
 They are array functions of the model and answer on the branch of its start values. A robot with n joints has n
-coordinates of its pose, of the position and then of elements 1 to 3 of the quaternion, those that its joints move at the
-start. The rest of a pose follows from these; where another rest is asked for, the pose is out of reach.
+coordinates of its pose, of the position and then of the quaternion without its largest element at the start, those that its
+joints move there. The rest of a pose follows from these; where another rest is asked for, the pose is out of reach.
 """
 
 from collections.abc import Sequence
@@ -79,7 +79,7 @@ class ModelFunctions:
         found[:, :, moved] = slopes[:, :, : len(moved)]
         if R is not None:
             found[:, :, 3:] = (
-                slopes[:, :, len(moved) :] @ _turns_of_quaternions(R)[:, places[places >= 3] - 3]
+                slopes[:, :, len(moved) :] @ self._turns_of_quaternions(R)[:, places[places >= 3] - 3]
             )
         return self._in_reach(found, r, R)
 
@@ -97,7 +97,7 @@ class ModelFunctions:
             return self._in_reach(moves[:, :3] @ by_joints, r, R)
         if count == 6:
             turns = np.zeros((len(x), 6, 6))
-            turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), _turns_of_quaternions(R)
+            turns[:, :3, :3], turns[:, 3:, 3:] = np.eye(3), self._turns_of_quaternions(R)
             return solved(turns, by_joints)
         return self._in_reach(twists(moves, R) @ by_joints, r, R)
 
@@ -137,7 +137,7 @@ class ModelFunctions:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """The coordinates of the pose that the inverse is given: 0 to 2 of the position, 3 to 5 of the quaternion."""
+        """The coordinates of the pose that the inverse is given: 0 to 2 of the position, 3 to 5 of `_turned`."""
         count = len(self.joints)
         if count > 3 and f"{self.tool}.q" not in self.dae.vectors:
             raise ModelError(
@@ -162,12 +162,12 @@ class ModelFunctions:
 
     @property
     def _moves(self) -> np.ndarray:
-        """What the joints do at the start to the position, and to elements 1 to 3 of the quaternion, (3 or 6, n)."""
+        """What the joints do at the start to the position, and to the elements `_turned` of the quaternion, (3 or 6, n)."""
         slopes = self._forward.jacobian(*self.home.q[:, None])[0]
         if f"{self.tool}.q" not in self.dae.vectors:
             return slopes[:3]
         moves = twists(slopes[None], self.home.R[None])[0]
-        return np.vstack([moves[:3], _turns_of_quaternions(self.home.R[None])[0] @ moves[3:]])
+        return np.vstack([moves[:3], self._turns_of_quaternions(self.home.R[None])[0] @ moves[3:]])
 
     def _forward_from(self, x: np.ndarray, q: np.ndarray):
         """Poses of which the inverse is q, from coordinates x (N, n) near them; NaN where Newton does not end."""
@@ -189,9 +189,11 @@ class ModelFunctions:
     def _pose_of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Poses of coordinates."""
         if len(self.places) == 6:
+            q = np.empty((len(x), 4))
+            q[:, self._turned] = x[:, 3:]
             with np.errstate(invalid="ignore"):
-                scalar = np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
-            return x[:, :3], of_quaternions(np.column_stack([scalar, x[:, 3:]]))
+                q[:, self._largest] = self._sign * np.sqrt(1 - np.sum(x[:, 3:] ** 2, axis=1))
+            return x[:, :3], of_quaternions(q)
         return self._posed(self._following.around(*self._arguments(x)))
 
     def _joints_of(self, x: np.ndarray) -> np.ndarray:
@@ -232,7 +234,9 @@ class ModelFunctions:
     def _given(self) -> list[str]:
         """Names of the coordinates of the pose; the position in one where it is whole."""
         whole = self.places[:3] == (0, 1, 2)
-        names = [f"{self.tool}.{'r' if k < 3 else 'q'}[{k if k < 3 else k - 2}]" for k in self.places]
+        names = [
+            f"{self.tool}.r[{k}]" if k < 3 else f"{self.tool}.q[{self._turned[k - 3]}]" for k in self.places
+        ]
         return [f"{self.tool}.r", *names[3:]] if whole else names
 
     def _arguments(self, x: np.ndarray) -> list[np.ndarray]:
@@ -254,7 +258,41 @@ class ModelFunctions:
         self.check(R)
         if R is None:
             return r[:, list(self.places)]
-        return np.concatenate([r, quaternions(R)[:, 1:]], axis=1)[:, list(self.places)]
+        return np.concatenate([r, self._quaternions(R)[:, self._turned]], axis=1)[:, list(self.places)]
+
+    @cached_property
+    def _start_quaternion(self) -> np.ndarray:
+        """Quaternion of the tool where the model starts, (4,), which may be of either sign."""
+        names = self.dae.expand(f"{self.tool}.q")
+        return np.array([float(self.dae.numbers([n], self.dae.start)[0]) for n in names])
+
+    @property
+    def _largest(self) -> int:
+        """The element of the quaternion that follows from the others: far from zero, where its sign would be lost."""
+        return int(np.argmax(np.abs(self._start_quaternion)))
+
+    @property
+    def _sign(self) -> float:
+        return float(np.sign(self._start_quaternion[self._largest]))
+
+    @property
+    def _turned(self) -> list[int]:
+        """The other elements."""
+        return [k for k in range(4) if k != self._largest]
+
+    def _quaternions(self, R: np.ndarray) -> np.ndarray:
+        """Quaternions (N, 4) whose largest element at the start keeps its sign."""
+        q = quaternions(R)
+        return np.where(q[:, [self._largest]] * self._sign < 0, -q, q)
+
+    def _turns_of_quaternions(self, R: np.ndarray) -> np.ndarray:
+        """Change of the elements `_turned` of quaternions by a rotation vector in the world, (N, 3, 3)."""
+        q = self._quaternions(R)
+        # a rotation vector w turns the quaternion (a, v) by half of (-v . w, (a I - [v]x) w)
+        whole = (
+            np.concatenate([-q[:, None, 1:], q[:, 0, None, None] * np.eye(3) - skewed(q[:, 1:])], axis=1) / 2
+        )
+        return whole[:, self._turned]
 
     def check(self, R: np.ndarray | None) -> None:
         """ModelError where an orientation is missing or one too many."""
@@ -308,13 +346,6 @@ def twists(slopes: np.ndarray, R: np.ndarray) -> np.ndarray:
         @ np.swapaxes(R, 1, 2)[:, None]
     )
     return np.concatenate([slopes[:, :3], np.stack([turns[:, :, i, j] for i, j in SPIN], axis=1)], axis=1)
-
-
-def _turns_of_quaternions(R: np.ndarray) -> np.ndarray:
-    """Change of elements 1 to 3 of quaternions by a rotation vector in the world, (N, 3, 3)."""
-    q = quaternions(R)
-    # a rotation vector turns the quaternion (w, v) by half of (w I - [v]x) in its last three elements
-    return (q[:, 0, None, None] * np.eye(3) - skewed(q[:, 1:])) / 2
 
 
 def orientations(tool: str) -> tuple[str, str]:

@@ -92,8 +92,10 @@ def test_near_of_a_delta_robot_is_where_newton_starts(delta):
     np.testing.assert_allclose(turns, R, atol=1e-9)
 
 
-def test_the_legs_of_a_stewart_platform():
-    kinematics = Kinematics(StewartPlatform(), tool="platform")
+@pytest.mark.parametrize("start", [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [-0.6, 0.0, 0.0, -0.8]])
+def test_the_legs_of_a_stewart_platform(start):
+    """Level, half a turn about the vertical, and a quaternion of the other sign."""
+    kinematics = Kinematics(StewartPlatform(platform=dict(q=dict(start=start))), tool="platform")
     assert kinematics.joints == tuple(f"legs[{k}].s" for k in range(6))
     random = np.random.default_rng(1)
     r = kinematics.home.r + random.uniform(-0.05, 0.05, (20, 3))
