@@ -14,6 +14,7 @@ from gantrytau_optimica.failures.following_ends import without_following
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
 from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
+from gantrytau_optimica.refinement.singular_arcs import continuous_on_arcs
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribed_again
@@ -293,7 +294,8 @@ def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimu
     """The solution on other meshes, from this one, or None if it is not found."""
     trajectories = list(optimum.phases.values())
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    program = transcribed_again(optimum.program, meshes=meshes, located=located)
+    problem = continuous_on_arcs(optimum.program.problem, trajectories, meshes)
+    program = transcribed_again(optimum.program, problem, meshes, located)
     better = solve(program, warm_start(trajectories, program))
     return better if better.success else None
 
