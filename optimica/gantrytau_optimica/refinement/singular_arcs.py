@@ -4,50 +4,111 @@ H_u = 0 on an arc, and H_u does not depend on u:  errors of H_u of order h^3 wou
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
-from gantrytau_optimica.answers.playback.arcs import arcs, input_sides
+from gantrytau_optimica.answers.playback.arcs import NEAR, arcs, input_sides
+from gantrytau_optimica.answers.playback.switches import input_range
 from gantrytau_optimica.control.control_problem import ControlProblem, Phase, Pieces
+from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
+FEWEST = 8  # elements of an arc whose ends are told from its inside
+MIXED, TELLING = (
+    2,
+    7,
+)  # elements beside its end that feel it, and up to which one tells the course that leads there
+CLOSE = 0.1  # of an element: borders closer to the end of an arc give way to it
 SAME = 1e-9  # of the horizon, by rounding
+
+Stretch = tuple[str, float, float]  # an input, and shares of the horizon from and to which it is smooth
 
 
 def continuous_on_arcs(
-    problem: ControlProblem, trajectories: list[Trajectory], meshes: list[Mesh]
+    problem: ControlProblem, stretches: list[list[Stretch]], meshes: list[Mesh]
 ) -> ControlProblem:
-    """The problem with ramps that are continuous inside of singular arcs of a solution, and may jump elsewhere."""
+    """The problem with ramps that are continuous on stretches, by phase, and may jump at all other borders."""
 
-    def changed(phase: Phase, trajectory: Trajectory, mesh: Mesh) -> Phase:
-        inside = _inside(trajectory, mesh)
-        inputs = []
+    def changed(phase: Phase, smooth: list[Stretch], mesh: Mesh) -> Phase:
+        inner, inputs = mesh.borders[1:-1], []
         for signal in phase.inputs:
             if signal.pieces.kind == "ramps":
-                on = inside.get(signal.name, np.zeros(mesh.elements, bool))
-                jumps = ~(on[1:] & on[:-1])
-                borders = () if jumps.all() else (0.0, *mesh.borders[1:-1][jumps].tolist(), 1.0)
+                ends = [(begin, end) for name, begin, end in smooth if name == signal.name]
+                on = [(inner > begin + SAME) & (inner < end - SAME) for begin, end in ends]
+                jumps = ~np.any(on, axis=0) if on else np.ones(inner.size, bool)
+                borders = () if jumps.all() else (0.0, *inner[jumps].tolist(), 1.0)
                 signal = replace(signal, pieces=Pieces("ramps", borders=borders))
             inputs.append(signal)
         return replace(phase, inputs=tuple(inputs))
 
-    phases = map(changed, problem.phases, trajectories, meshes)
+    phases = map(changed, problem.phases, stretches, meshes)
     return replace(problem, phases=tuple(phases))
 
 
-def _inside(trajectory: Trajectory, mesh: Mesh) -> dict[str, np.ndarray]:
-    """Elements (n,) of a mesh on singular arcs, by their input; an element of the solution at which an arc of any input
-    ends is left out, as the law may jump inside of it.
-    """
+def inside_of_arcs(trajectory: Trajectory) -> list[Stretch]:
+    """Stretches of singular arcs but for elements beside the end of an arc of any input: a law may jump inside of them."""
+    borders = trajectory.mesh.borders
+    return [(n, borders[i + (i > 0)], borders[j - (j + 1 < borders.size)]) for n, i, j in _runs(trajectory)]
+
+
+def whole_arcs(trajectory: Trajectory) -> list[Stretch]:
+    """Stretches of singular arcs up to where the means of inputs over the elements at their ends tell that they end."""
+    borders = trajectory.mesh.borders
+    n, found = trajectory.mesh.elements, []
+    for name, i, j in _runs(trajectory):
+        if j - i < FEWEST:
+            continue
+        values, limits = _ramps(trajectory, name)
+        begin = borders[i] + _at_limit(borders, values, i, limits)
+        end = borders[j] - _at_limit(1 - borders[::-1], values[::-1, ::-1], n - j, limits)
+        found.append((name, begin, end))
+    return found
+
+
+def with_borders_at(stretches: list[Stretch], mesh: Mesh) -> Mesh:
+    """The mesh with borders at the ends of stretches."""
+    borders = mesh.borders
+    for end in {end for _, *ends in stretches for end in ends}:
+        k = int(np.clip(np.searchsorted(borders, end), 1, borders.size - 1))
+        apart = np.abs(borders - end) > CLOSE * (borders[k] - borders[k - 1])
+        apart[[0, -1]] = True
+        if apart.all() or np.min(np.abs(borders - end)) > SAME:
+            borders = np.unique(np.append(borders[apart], end))
+    return Mesh(borders)
+
+
+def _runs(trajectory: Trajectory) -> list[tuple[str, int, int]]:
+    """Inputs on singular arcs, and the borders between which no arc of any input ends."""
+    borders, found = trajectory.mesh.borders, []
     knots, _ = input_sides(trajectory)
-    old, times = trajectory.mesh.borders, trajectory.times(mesh.borders)
-    mixed = np.any((old[:-1, None] <= knots + SAME) & (knots - SAME <= old[1:, None]), axis=1)
-    element, _ = trajectory.mesh.locate((mesh.borders[:-1] + mesh.borders[1:]) / 2)
-    middles = (times[:-1] + times[1:]) / 2
-    found: dict[str, np.ndarray] = {}
     for arc in arcs(trajectory):
         if arc.side == "singular":
-            on = (middles > arc.begin) & (middles < arc.end) & ~mixed[element]
-            found[arc.name] = found.get(arc.name, np.zeros(on.size, bool)) | on
+            begin, end = np.interp([arc.begin, arc.end], trajectory.times(borders), borders)
+            cuts = np.array([begin, *knots[(knots > begin + SAME) & (knots < end - SAME)], end])
+            at = np.argmin(np.abs(borders[:, None] - cuts), axis=0).tolist()
+            found += [(arc.name, i, j) for i, j in pairwise(at) if j - i > 2]
     return found
+
+
+def _ramps(trajectory: Trajectory, name: str) -> tuple[np.ndarray, tuple[float, float]]:
+    """Values (n, 2) of an input at the ends of its elements, and its limits."""
+    phase = trajectory.phase
+    number = next(k for k, s in enumerate(phase.signals) if s.name == name)
+    values = trajectory.w[trajectory.layout.tracks[number].unknowns]
+    return values[:, [0, -1]], signal_limits(phase, trajectory.problem.name)[name]
+
+
+def _at_limit(borders: np.ndarray, values: np.ndarray, first: int, limits: tuple[float, float]) -> float:
+    """How long an input is still at the limit that it comes from where element `first` begins."""
+    width = input_range(values, *limits)
+    near = [x for x in limits if first > 0 and abs(values[first - 1].mean() - x) <= NEAR * width]
+    mixed, after = slice(first, first + MIXED), slice(first + MIXED, first + TELLING)
+    middles, means = (borders[:-1] + borders[1:]) / 2 - borders[first], values.mean(axis=1)
+    course = np.polynomial.Polynomial.fit(middles[after], means[after], 2)
+    widths = np.diff(borders)[mixed]
+    gap = near[0] - course(0.0) if near else 0.0
+    if abs(gap) <= NEAR * width:
+        return 0.0
+    return float(np.clip(widths @ (means[mixed] - course(middles[mixed])) / gap, 0.0, widths.sum()))
