@@ -21,6 +21,7 @@ from gantrytau_optimica.refinement.singular_arcs import (
     whole_arcs,
     with_borders_at,
 )
+from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribed_again
@@ -158,6 +159,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
     clock, search, best = reached.clock, optimum.search, optimum
     rounds: list[Round] = []
     moving, moved, stopped, before, by_arcs = True, False, "", np.nan, True
+    held: Optimum | None = None  # the answer, whose arcs only get sharper ends
     try:
         while True:
             number = f"round {len(rounds) + 1} of at most {MOST_ROUNDS + 1}"
@@ -193,11 +195,14 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                 break
             optimum = better
         if _holds(rounds, accuracy) and clock.left:
-            clock.enter("ends of singular arcs")
-            best = _with_sharp_ends(best, rounds, accuracy, solve)
+            held = reached.best
+            best = _with_sharp_ends(best, rounds, accuracy, solve, clock)
     except KeyboardInterrupt:
+        if held is not None:
+            reached.best = held
+            raise
         newest = reached.best or best
-        refinement = replace(_record(best, rounds, accuracy), stopped=reached.reason)
+        refinement = replace(_record(best, rounds, accuracy), reached=False, stopped=reached.reason)
         reached.best = newest.with_notes(refinement=refinement, search=search)
         raise
     return best.with_notes(refinement=_record(best, rounds, accuracy, stopped), search=search)
@@ -314,14 +319,16 @@ def _solved_on(
 
 
 def _with_sharp_ends(
-    optimum: Optimum, rounds: list[Round], accuracy: float, solve: Callable[..., Optimum]
+    optimum: Optimum, rounds: list[Round], accuracy: float, solve: Callable[..., Optimum], clock: Clock
 ) -> Optimum:
     """The answer with borders where its singular arcs end, as the last round; the answer itself if that does not hold."""
     trajectories = list(optimum.phases.values())
     stretches = [whole_arcs(t) for t in trajectories]
-    if _moves(optimum) or not any(stretches):
+    fixed = _moves(optimum) or not all(_of_ramps(t.phase) and _movable(t.phase) for t in trajectories)
+    if fixed or not any(stretches):
         return optimum
     meshes = [with_borders_at(one, t.mesh) for one, t in zip(stretches, trajectories, strict=True)]
+    clock.enter("borders where singular arcs end")
     sharp = _solved_on(optimum, meshes, solve, stretches, hot=True)
     if sharp is not None:
         last = replace(_round(sharp), before=rounds[-1].before)

@@ -1,6 +1,8 @@
 """Inputs on singular arcs: continuous, as the objective hardly feels how they jump between elements.
 
-H_u = 0 on an arc, and H_u does not depend on u:  errors of H_u of order h^3 would be jumps of u of order h
+    d2/dt2 H_u = a + b u = 0 on an arc:  an error of H_u of order h^3 is one of u of order h
+
+An arc begins inside of an element, whose mean of the input tells where: borders stand there in the end.
 """
 
 from dataclasses import replace
@@ -16,10 +18,8 @@ from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.trajectory import Trajectory
 
 FEWEST = 8  # elements of an arc whose ends are told from its inside
-MIXED, TELLING = (
-    2,
-    7,
-)  # elements beside its end that feel it, and up to which one tells the course that leads there
+MIXED = 2  # elements beside the end of an arc that feel it
+TELLING = 7  # elements from the end of an arc, up to which one tells the course there
 CLOSE = 0.1  # of an element: borders closer to the end of an arc give way to it
 SAME = 1e-9  # of the horizon, by rounding
 
@@ -70,12 +70,12 @@ def whole_arcs(trajectory: Trajectory) -> list[Stretch]:
 def with_borders_at(stretches: list[Stretch], mesh: Mesh) -> Mesh:
     """The mesh with borders at the ends of stretches."""
     borders = mesh.borders
-    for end in {end for _, *ends in stretches for end in ends}:
+    for end in sorted({end for _, *ends in stretches for end in ends}):
         k = int(np.clip(np.searchsorted(borders, end), 1, borders.size - 1))
-        apart = np.abs(borders - end) > CLOSE * (borders[k] - borders[k - 1])
-        apart[[0, -1]] = True
-        if apart.all() or np.min(np.abs(borders - end)) > SAME:
-            borders = np.unique(np.append(borders[apart], end))
+        off = np.abs(borders - end)
+        near = off <= CLOSE * (borders[k] - borders[k - 1])
+        if not (near[0] or near[-1]) and off.min() > SAME:
+            borders = np.sort(np.append(borders[~near], end))
     return Mesh(borders)
 
 
