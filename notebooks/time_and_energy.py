@@ -261,6 +261,7 @@ on_arc = fastest.signal("torque[0]")(np.linspace(0.36, 0.56, 101))
 print(f"on the arc motor 1 gives {on_arc.min():.2f} to {on_arc.max():.2f} N.m; its mean there is ", end="")
 print(f"{mean(fastest, 0.36, 0.56):.2f} N.m, and {mean(hasty, 0.36, 0.56):.2f} N.m in the plain answer")
 assert 0 < on_arc.min() < on_arc.max() < 0.75 * LIMIT
+assert np.sum(np.abs(np.diff(on_arc))) < 1.01 * np.ptp(on_arc)  # it rises without teeth
 assert abs(mean(fastest, 0.36, 0.56) - mean(hasty, 0.36, 0.56)) < 0.5  # N.m
 
 # %% [markdown]

@@ -14,6 +14,14 @@ from gantrytau_optimica.failures.following_ends import without_following
 from gantrytau_optimica.refinement.arc_mesh import arc_mesh, held_at_limits, with_arcs, wrong_signs, zoom_mesh
 from gantrytau_optimica.refinement.incumbent import LATE, BestSoFar
 from gantrytau_optimica.refinement.remesh import better_mesh, open_elements
+from gantrytau_optimica.refinement.singular_arcs import (
+    Stretch,
+    continuous_on_arcs,
+    inside_of_arcs,
+    whole_arcs,
+    with_borders_at,
+)
+from gantrytau_optimica.solving.clock import Clock
 from gantrytau_optimica.solving.warm_start import warm_start
 from gantrytau_optimica.transcription.mesh import Mesh
 from gantrytau_optimica.transcription.transcribe import transcribed_again
@@ -151,6 +159,7 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
     clock, search, best = reached.clock, optimum.search, optimum
     rounds: list[Round] = []
     moving, moved, stopped, before, by_arcs = True, False, "", np.nan, True
+    held: Optimum | None = None  # the answer, whose arcs only get sharper ends
     try:
         while True:
             number = f"round {len(rounds) + 1} of at most {MOST_ROUNDS + 1}"
@@ -173,12 +182,10 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
             if better is not None:
                 optimum, moved = better, _moves(better)
                 continue
+            smooth = [inside_of_arcs(t) for t in optimum.phases.values()]
             for how in [*(["moving"] if moving else []), "switches", "divided"]:
-                better = (
-                    _solved_on(optimum, _meshes(optimum, rounds, accuracy, how), solve)
-                    if clock.left
-                    else None
-                )
+                meshes = _meshes(optimum, rounds, accuracy, how)
+                better = _solved_on(optimum, meshes, solve, smooth) if clock.left else None
                 if better is not None:
                     moved = _moves(better)
                     break
@@ -187,7 +194,13 @@ def refined(optimum: Optimum, accuracy: float, solve: Callable[..., Optimum], re
                 stopped = "" if clock.left else LATE
                 break
             optimum = better
+        if _holds(rounds, accuracy) and clock.left:
+            held = reached.best
+            best = _with_sharp_ends(best, rounds, accuracy, solve, clock)
     except KeyboardInterrupt:
+        if held is not None:
+            reached.best = held
+            raise
         newest = reached.best or best
         refinement = replace(_record(best, rounds, accuracy), reached=False, stopped=reached.reason)
         reached.best = newest.with_notes(refinement=refinement, search=search)
@@ -289,13 +302,40 @@ def _meshes(optimum: Optimum, rounds: list[Round], accuracy: float, how: str) ->
     return meshes
 
 
-def _solved_on(optimum: Optimum, meshes: list[Mesh], solve: Callable[..., Optimum]) -> Optimum | None:
-    """The solution on other meshes, from this one, or None if it is not found."""
+def _solved_on(
+    optimum: Optimum,
+    meshes: list[Mesh],
+    solve: Callable[..., Optimum],
+    smooth: list[list[Stretch]],
+    hot: bool = False,
+) -> Optimum | None:
+    """The solution on other meshes, continuous on smooth stretches of inputs, from this one; None if it is not found."""
     trajectories = list(optimum.phases.values())
     located = (trajectories[0].numbers, [mesh.borders for mesh in meshes])
-    program = transcribed_again(optimum.program, meshes=meshes, located=located)
-    better = solve(program, warm_start(trajectories, program))
+    problem = continuous_on_arcs(optimum.program.problem, smooth, meshes)
+    program = transcribed_again(optimum.program, problem, meshes, located)
+    better = solve(program, warm_start(trajectories, program), hot=hot)
     return better if better.success else None
+
+
+def _with_sharp_ends(
+    optimum: Optimum, rounds: list[Round], accuracy: float, solve: Callable[..., Optimum], clock: Clock
+) -> Optimum:
+    """The answer with borders where its singular arcs end, as the last round; the answer itself if that does not hold."""
+    trajectories = list(optimum.phases.values())
+    stretches = [whole_arcs(t) for t in trajectories]
+    fixed = _moves(optimum) or not all(_of_ramps(t.phase) and _movable(t.phase) for t in trajectories)
+    if fixed or not any(stretches):
+        return optimum
+    meshes = [with_borders_at(one, t.mesh) for one, t in zip(stretches, trajectories, strict=True)]
+    clock.enter("borders where singular arcs end")
+    sharp = _solved_on(optimum, meshes, solve, stretches, hot=True)
+    if sharp is not None:
+        last = replace(_round(sharp), before=rounds[-1].before)
+        if _holds([*rounds[:-1], last], accuracy):
+            rounds[-1] = last
+            return sharp
+    return optimum
 
 
 def _round(optimum: Optimum) -> Round:

@@ -107,6 +107,10 @@ def test_singular_arcs():
     )  # constant on the arc, which hardly matters
     rocket = held(optimize(Goddard, elements=20, refine=ACCURACY))
     assert -rocket.objective == near(goddard_by_its_singular_arc())
+    thrust = rocket.signal("rocket.thrust")(
+        np.linspace(0.026, 0.071, 2001)
+    )  # falls or rises on the arc, without teeth
+    assert np.sum(np.abs(np.diff(thrust))) < 1.05 * np.ptp(thrust)
 
 
 def test_the_robot_on_a_straight_line():
