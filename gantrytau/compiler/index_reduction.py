@@ -29,7 +29,7 @@ class Indexed:
 
     residuals: by (equation, times differentiated); names: of the equations; counts: how often each
     equation is differentiated; orders: highest derivative of each unknown, by name; exact: names of parameters and of
-    what is known; structural_index as Pryce defines it.
+    what is known; plain: incidence of the equations that are not differentiated; structural_index as Pryce defines it.
     """
 
     residuals: Mapping[Key, ca.SX]
@@ -37,11 +37,13 @@ class Indexed:
     counts: tuple[int, ...]
     orders: Mapping[str, int]
     exact: frozenset[str] = frozenset()
+    plain: tuple[tuple[Derivative, ...], ...] = ()
 
     @cached_property
     def incidence(self) -> Mapping[Key, tuple[Derivative, ...]]:
         """Which derivatives of which variables stand in each equation."""
-        return {k: derivatives_in(r) for k, r in self.residuals.items()}
+        known = {(i, 0): row for i, row in enumerate(self.plain)}
+        return {k: known[k] if k in known else derivatives_in(r) for k, r in self.residuals.items()}
 
     def symbols(self, known: Collection[str]) -> list[str]:
         """Unknowns with their derivatives, and the known variables with the derivatives that occur."""
@@ -96,7 +98,7 @@ def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) 
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     names = tuple(e.name for e in reduced.equations)
     exact = frozenset((*reduced.table.independent, *reduced.known, flat.time.name()))
-    return Indexed(residuals, names, tuple(int(c) for c in counts), orders, exact)
+    return Indexed(residuals, names, tuple(int(c) for c in counts), orders, exact, reduced.incidence)
 
 
 def _offsets(reduced: Reduced, rows: list[dict[int, int]], mentioned: np.ndarray, flat: FlatModel):

@@ -67,8 +67,7 @@ def switched(
     moving = [names is None or leaf.name() in names for leaf in leaves]
     if not any(moving):
         return Switched(tuple(expressions), ())
-    function = ca.Function("switched", [ca.vertcat(*leaves)], [whole])
-    if not any(function.instruction_id(k) in _SWITCHING for k in range(function.n_instructions())):
+    if not may_switch(whole):
         return Switched(tuple(expressions), ())
     reader = _Walk(None if smooth else [])
     (found,) = computed(
@@ -84,6 +83,12 @@ def switched(
     pieces = ca.vertsplit(ca.vertcat(*written), np.cumsum([0, *(e.numel() for e in dense)]).tolist())
     shaped = (ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True))
     return Switched(tuple(shaped), switches, bool(reader.smooth))
+
+
+def may_switch(expression: ca.SX) -> bool:
+    """Whether an expression holds an operation that switches, on whatever symbols."""
+    function = ca.Function("switched", [ca.vertcat(*ca.symvar(expression))], [expression])
+    return not _SWITCHING.isdisjoint(map(function.instruction_id, range(function.n_instructions())))
 
 
 _COMPARING = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_IF_ELSE_ZERO)

@@ -37,11 +37,10 @@ def refuse_undetermined(
 
     asked: start values before they were consistent; sample: afterwards.
     """
-    watched = [b for b in blocks if b.tears and b.kind in ("explicit", "linear")]
+    watched = [(b, b.slopes) for b in blocks if b.slopes is not None]
     if not watched:
         return
-    matrices = [ca.jacobian(ca.vertcat(*b.residuals), ca.vertcat(*b.tears)) for b in watched]
-    entries = [e for m in matrices for e in m.nonzeros()]
+    entries = [e for _, slopes in watched for e in slopes.nonzeros()]
     values = values_at(ca.vertcat(*entries), sample).ravel()
     small = np.flatnonzero((values != 0) & (np.abs(values) <= DOUBTFUL * np.abs(values).max(initial=1.0)))
     if small.size:
@@ -49,7 +48,7 @@ def refuse_undetermined(
         noise = NOISE * values_at(ca.vertcat(*sizes), sample).ravel()
         values[small[np.abs(values[small]) <= noise]] = 0.0
     begin = 0
-    for block, symbolic in zip(watched, matrices, strict=True):
+    for block, symbolic in watched:
         matrix = np.zeros(symbolic.shape)
         matrix[tuple(symbolic.sparsity().get_triplet())] = values[begin : begin + symbolic.nnz()]
         begin += symbolic.nnz()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.symbol_spaces import Substitution, values_at
+from gantrytau.compiler.symbol_spaces import Substitution, called, values_at
 
 COUNT = 12
 TRUSTED = 1e-3  # of a pivot at the start, relative to its row: with less it costs more than three digits
@@ -56,14 +56,18 @@ class Guide:
         """The numbers of an expression at the start, then at points around it, (points, rows, columns)."""
         (resolved,) = Substitution(tuple(self._solved)).inserted([expression])
         leaves = ca.symvar(resolved)
-        function = ca.Function("sample", [ca.vertcat(*leaves)], [ca.densify(ca.vec(resolved))])
+        function = ca.Function("sample", [ca.vertcat(*leaves)], [resolved])
         centre = np.array([self.start[leaf.name()] for leaf in leaves])
         moves = np.array([leaf.name() not in self.parameters for leaf in leaves], dtype=bool)
         steps = np.random.default_rng(0).uniform(-SPREAD, SPREAD, (len(leaves), COUNT))
         points = centre[:, None] + steps * (moves * np.maximum(np.abs(centre), 1.0))[:, None]
-        found = np.array(function.map(COUNT)(points)).T.reshape(COUNT, *expression.shape[::-1])
-        found = found.transpose(0, 2, 1)[np.isfinite(found).all(axis=(1, 2))]  # the others are out of reach
-        return np.concatenate([self.at_start(expression)[None], found])
+        nonzeros = np.array([called(function, point)[0] for point in points.T])
+        nonzeros = nonzeros[np.isfinite(nonzeros).all(axis=1)]  # the others are out of reach
+        found = np.zeros((len(nonzeros) + 1, *expression.shape))
+        rows, columns = resolved.sparsity().get_triplet()
+        found[0] = self.at_start(expression)
+        found[1:, rows, columns] = nonzeros
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
 from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
-from gantrytau.compiler.symbol_spaces import Substitution
-from gantrytau.language.piecewise import switched, with_modes
+from gantrytau.compiler.symbol_spaces import Substitution, column
+from gantrytau.language.piecewise import Switched, may_switch, switched, with_modes
 from gantrytau.language.symbols import split_derivative
 
 LARGEST_BY_VALUE = 8  # the same with all the ways in which its pivots can be chosen
@@ -49,6 +49,7 @@ class Block:
     margins: tuple[ca.SX, ...] = ()
     firm: tuple[Key, ...] = ()  # equations of pairs whose pivots do not vanish
     scales: Scales | None = None  # of linear blocks with several unknowns
+    slopes: ca.SX | None = None  # of residuals by tears, of explicit and linear blocks
 
     @property
     def definitions(self) -> list[tuple[ca.SX, ca.SX]]:
@@ -109,8 +110,9 @@ def solve_blocks(
 ) -> SolvedBlocks:
     """The solutions of blocks, given as (equations, unknowns) in the order of their solution."""
     found: list[Block] = []
+    still = not may_switch(column([residuals[k] for equations, _ in pattern for k in equations]))
     for equations, unknowns in pattern:
-        block = solve_block(equations, unknowns, residuals, symbols, guide)
+        block = solve_block(equations, unknowns, residuals, symbols, guide, still)
         block.enter(guide)
         found.append(block)
     return SolvedBlocks(tuple(found))
@@ -135,18 +137,19 @@ def solve_block(
     residuals: Mapping[Key, ca.SX],
     symbols: Mapping[str, ca.SX],
     guide: Guide,
+    still: bool = False,
 ) -> Block:
-    """The solution of one block; `guide` have a number for every symbol in it."""
+    """The solution of one block; `guide` has a number for every symbol in it; still: whether nothing in it switches."""
     x = ca.vertcat(*(symbols[n] for n in unknowns))
     f = ca.vertcat(*(residuals[k] for k in equations))
-    smooth = switched([f], {leaf.name() for leaf in x.elements()})
-    jacobian = ca.jacobian(smooth.expressions[0], x)
-    linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
+    smooth = Switched((f,), ()) if still else switched([f], set(unknowns))
     if len(unknowns) == 1:
         block = _finish(equations, unknowns, (x,), (f,), (), guide, None, bool(smooth.switches))
         return replace(block, pairs=((equations[0], unknowns[0]),), firm=equations)
+    jacobian = ca.jacobian(smooth.expressions[0], x)
+    linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     (present,) = with_modes(smooth, [jacobian])
-    numbers = guide.around(ca.densify(present))
+    numbers = guide.around(present)
     barred = switching_places(smooth, x)
     partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
@@ -206,6 +209,7 @@ def _finish(
         return block("nonlinear") if found is None else block("piecewise", found[0], held=found[1])
     jacobian = ca.jacobian(f, y)
     if not ca.depends_on(jacobian, y):
+        parts["slopes"] = jacobian
         if scales is None:
             return block("explicit", (-_at_zero(f, y) / jacobian,))
         if guide.careful and len(tears) <= LARGEST_BY_VALUE:
