@@ -38,7 +38,7 @@ def view(
     result: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Show this motion of the model, saved by simulate or optimize as .csv or .nc. Repeatable: side by side.",
+            help="Show this motion of the model, saved by simulate or optimize. Repeatable: side by side.",
             show_default=False,
         ),
     ] = None,

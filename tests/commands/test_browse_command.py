@@ -3,7 +3,7 @@
 import pytest
 
 from gantrytau import Result
-from gantrytau.commands.arguments.saved_results import read_result
+from gantrytau.commands.arguments.saved_results import FORMATS, read_result
 from tests.viewing.test_browse import unpacked_text
 
 MISUSE = 2
@@ -19,10 +19,10 @@ def saved(tmp_path):
         descriptions={"a.r": "place", "a.law": "law: 0 stuck, 1 sliding"},
         title="run",
     )
-    return {suffix: run.save(tmp_path / f"run.{suffix}") for suffix in ("csv", "nc", "parquet")}
+    return {suffix: run.save(tmp_path / f"run{suffix}") for suffix in FORMATS}
 
 
-@pytest.mark.parametrize("suffix", ["csv", "nc", "parquet"])
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_a_saved_result_becomes_a_page_with_what_its_file_says(run, saved, tmp_path, suffix):
     said = run("browse", saved[suffix], "--first", "b.phi")
     page = tmp_path / "run.html"
@@ -33,16 +33,16 @@ def test_a_saved_result_becomes_a_page_with_what_its_file_says(run, saved, tmp_p
     assert found["a.r[0]"]["unit"] == "m"
     assert told["first"] == ["b.phi"]
     assert values("a.r[0]") == pytest.approx([0, 1, 2, 3])
-    if suffix != "csv":  # which has no room for descriptions
+    if suffix != ".csv":  # which has no room for descriptions
         assert found["a.r[0]"]["words"] == "place"
         assert found["a.law"]["modes"] == ["stuck", "sliding"]
 
 
 def test_runs_are_drawn_over_each_other_with_the_variables_that_are_named(answer, saved, tmp_path):
     page = tmp_path / "both.html"
-    told = answer("browse", saved["nc"], saved["parquet"], "--names", "a", "-o", page)
+    told = answer("browse", saved[".nc"], saved[".parquet"], "--names", "a", "-o", page)
     assert (told["variables"], told["bytes"]) == (3, page.stat().st_size)
-    assert "b.phi" not in read_result(saved["nc"], wanted=["a"])
+    assert "b.phi" not in read_result(saved[".nc"], wanted=["a"])
 
 
 def test_a_model_moves_beside(run, tmp_path):
@@ -56,8 +56,13 @@ def test_a_model_moves_beside(run, tmp_path):
     ("name", "content", "words"),
     [
         ("none.nc", None, "there is no such file"),
-        ("run.txt", "1 2 3", "found the suffix '.txt', expected a result saved as .csv or .nc or .parquet"),
+        (
+            "run.txt",
+            "1 2 3",
+            "found the suffix '.txt', expected a result saved as .csv, .nc, .parquet or .mat",
+        ),
         ("run.nc", "no netCDF", "cannot be read as a result"),
+        ("run.mat", "no trajectory", "cannot be read as a result"),
         ("run.parquet", "no parquet", "cannot be read as a result"),
         ("run.csv", "x,y\n1,2\n2,3\n", "found no 'time'"),
         ("run.csv", "time,x\n1,2\n", "found 1 times"),
@@ -74,11 +79,11 @@ def test_files_that_are_no_results_are_told(fails, tmp_path, name, content, word
 
 
 def test_unknown_names_are_told_as_the_option(fails, saved, tmp_path):
-    assert "--names" in fails(MISUSE, "browse", saved["nc"], "--names", "c", "-o", tmp_path / "page.html")
-    assert "--first" in fails(MISUSE, "browse", saved["nc"], "--first", "c", "-o", tmp_path / "page.html")
+    assert "--names" in fails(MISUSE, "browse", saved[".nc"], "--names", "c", "-o", tmp_path / "page.html")
+    assert "--first" in fails(MISUSE, "browse", saved[".nc"], "--first", "c", "-o", tmp_path / "page.html")
 
 
-@pytest.mark.parametrize("suffix", ["csv", "nc", "parquet"])
+@pytest.mark.parametrize("suffix", FORMATS)
 def test_what_is_too_large_is_told_before_it_is_read(saved, suffix):
-    with pytest.raises(Exception, match=r"found .* MB of numbers, expected at most 0 MB; .*choose variables"):
+    with pytest.raises(Exception, match=r"found .* MB of numbers, expected at most 0 MB; "):
         read_result(saved[suffix], "RESULT", most=3)

@@ -67,7 +67,7 @@ def read_result(
     reader = FORMATS.get(file.suffix.lower())
     if reader is None:
         raise CommandError(
-            f"{place}: found the suffix '{file.suffix}', expected a result saved as {' or '.join(FORMATS)}"
+            f"{place}: found the suffix '{file.suffix}', expected a result saved as {_OFFERED}"
         )
     if not file.is_file():
         raise CommandError(f"{place}: there is no such file; check its path")
@@ -143,6 +143,34 @@ def _netcdf(file: Path, saved: _Saved) -> None:
             saved.values.update(_scalars(name, np.asarray(array.values, float)))
 
 
+def _dymola(file: Path, saved: _Saved) -> None:
+    """A trajectory 1.1 of Dymola or OpenModelica: data_1 has constants, data_2 signals, dataInfo says where each name is."""
+    from scipy.io import loadmat
+
+    saved.check_size(file.stat().st_size / 8, "save fewer variables")
+    try:
+        found = loadmat(file, chars_as_strings=False)
+    except Exception as error:  # of the versions of MATLAB's files, each has a reader with errors of its own
+        raise ValueError(str(error)) from error
+    across = "binTrans" in _texts(found["Aclass"], False)
+    names, words = (_texts(found[key], across) for key in ("name", "description"))
+    info, held = (found[key] if across else found[key].T for key in ("dataInfo", "data_1"))
+    moving = found["data_2"] if across else found["data_2"].T
+    for name, said, (matrix, row, *_) in zip(names, words, info.T.tolist(), strict=True):
+        name = "time" if name.lower() == "time" else name
+        if saved.reads(name):
+            signal = held[abs(row) - 1][0] if matrix == 1 else moving[abs(row) - 1]
+            saved.values[name] = np.sign(row) * signal
+            text, _, unit = said.rpartition(" [") if said.endswith("]") else (said, "", "")
+            saved.told(name, unit.rstrip("]").partition("|")[0], text)
+
+
+def _texts(letters: np.ndarray, across: bool) -> list[str]:
+    """Texts of a matrix of letters, a column each where they stand across, else a row."""
+    rows = letters.T if across else letters
+    return ["".join(row.tolist()).rstrip("\0 ") for row in rows]
+
+
 def _scalars(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """The elements of a vector or matrix over time, (times, ...), by the names that the model has for them."""
     inside = name.rstrip(")")  # der(r) has the elements der(r[0]), der(r[1]), ...
@@ -151,4 +179,11 @@ def _scalars(name: str, array: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         yield f"{inside}{place}{name[len(inside) :]}", array[(slice(None), *index)]
 
 
-FORMATS: dict[str, Callable[[Path, _Saved], None]] = {".csv": _csv, ".nc": _netcdf, ".parquet": _parquet}
+FORMATS: dict[str, Callable[[Path, _Saved], None]] = {
+    ".csv": _csv,
+    ".nc": _netcdf,
+    ".parquet": _parquet,
+    ".mat": _dymola,
+}
+*_FIRST, _LAST = FORMATS
+_OFFERED = f"{', '.join(_FIRST)} or {_LAST}"

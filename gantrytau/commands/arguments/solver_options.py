@@ -27,5 +27,5 @@ STARTS = _option("Number of first guesses to try.", GUESSES, show_default=False)
 
 Guess = Annotated[
     Path | None,
-    _option("Where the search starts: a result saved as .csv or .nc.", GUESSES, show_default=False),
+    _option("Where the search starts: a result that was saved.", GUESSES, show_default=False),
 ]

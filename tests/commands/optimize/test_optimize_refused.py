@@ -81,8 +81,8 @@ def test_a_problem_with_a_fault_is_told_with_the_line(fails, moves, name, words)
         (("--save", "a.cvs"), "a.cvs: found the suffix '.cvs'"),
         (("--set", "cart.mm=2"), "--set cart.mm: Fastest.cart has no 'mm'"),
         (
-            ("--guess", "a.mat"),
-            "--guess a.mat: found the suffix '.mat', expected a result saved as .csv or .nc",
+            ("--guess", "a.txt"),
+            "--guess a.txt: found the suffix '.txt', expected a result saved as .csv, .nc, .parquet or .mat",
         ),
         (("--guess", "a.csv"), "--guess a.csv: there is no such file; check its path"),
     ],
