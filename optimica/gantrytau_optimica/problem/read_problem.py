@@ -1,7 +1,7 @@
 """Reads an optimisation problem: the model translated, objective and constraints in its symbols."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -86,11 +86,12 @@ def read_problem(
     mentioned = [n for n, s in instance.symbols.by_name.items() if s.order > 0 and n not in known]
     links = tuple(_link(name, instance, phases, c) for c in found if isinstance(c, PhaseLink))
     given = _given(stages, flat)
-    said = flat, given, mentioned, objective, phases, constraints, asked.points, asked.targets
-    content = content_of(name, *said)
+    points, targets = tuple(asked.points), tuple(asked.targets)
+    said = _Said(name, flat, given, mentioned, objective, phases, tuple(constraints), points, targets)
+    content = content_of(said)
     read = kept_reading(content)
     if read is None:
-        read = _checked(name, *said, instance, guess)
+        read = _checked(said, instance, guess)
         if read.dae.flat is flat:  # nothing else decided on it, as starts by first guesses
             keep_reading(content, read)
     read = check_objective(replace(read, links=links, courses=_courses(name, stages, read.dae)))
@@ -98,36 +99,34 @@ def read_problem(
     return read
 
 
-def _checked(
-    name: str,
-    flat: FlatModel,
-    given: Sequence[str],
-    mentioned: Sequence[str],
-    objective: ca.SX,
-    phases: tuple[SymbolicPhase, ...],
-    constraints: Sequence[ConstraintRow],
-    points: Sequence[Point],
-    targets: Sequence[Target],
-    instance: Instance,
-    guess: Any,
-) -> SymbolicProblem:
+@dataclass(frozen=True, eq=False)
+class _Said:
+    """What a problem says, before its model is translated; given and mentioned: names of variables."""
+
+    name: str
+    flat: FlatModel
+    given: Sequence[str]
+    mentioned: Sequence[str]
+    objective: ca.SX
+    phases: tuple[SymbolicPhase, ...]
+    constraints: tuple[ConstraintRow, ...]
+    points: tuple[Point, ...]
+    targets: tuple[Target, ...]
+
+
+def _checked(said: _Said, instance: Instance, guess: Any) -> SymbolicProblem:
     """What is said of a problem, checked, with its model translated; links and courses are still missing."""
+    name, flat, phases, points, targets = said.name, said.flat, said.phases, said.points, said.targets
     check_units(flat)
     derivatives = {n: s.sx for n, s in instance.symbols.by_name.items() if s.order > 0}
     times = {_place(name, p.name, w): getattr(p, w) for p in phases for w in ("start_time", "final_time")}
     for one in (*points, *targets):
         refuse_calls(str(one.symbol), one.expression)
-    check_constraints(constraints, targets)
-    check_problem_units(replace(flat, derivatives=derivatives), constraints, points, times)
-    dae = _translated(
-        flat,
-        given,
-        mentioned,
-        partial(with_told_starts, flat, constraints, points, guess),
-    )
-    return SymbolicProblem(
-        name, dae, objective, phases, tuple(constraints), (), tuple(points), tuple(targets), {}
-    )
+    check_constraints(said.constraints, targets)
+    check_problem_units(replace(flat, derivatives=derivatives), said.constraints, points, times)
+    told = partial(with_told_starts, flat, said.constraints, points, guess)
+    dae = _translated(flat, said.given, said.mentioned, told)
+    return SymbolicProblem(name, dae, said.objective, phases, said.constraints, (), points, targets, {})
 
 
 def _translated(
