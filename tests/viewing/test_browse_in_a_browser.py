@@ -83,6 +83,14 @@ def test_dragging_zooms_and_what_is_seen_is_exported(tab, tmp_path):
     assert tab.run("Export.picture().then(blob => [blob.type, blob.size > 1000])") == ["image/png", True]
     tab.run("Panels.back(); Panels.back()")
     assert tab.run("Panels.view") is None
+    fingers = "[['down', 1, 0.5], ['down', 2, 0.75], ['move', 2, 1]]"  # what is held at both stays under them
+    tab.run(
+        "(over => {const {left, width} = over.getBoundingClientRect();"
+        f"for (const [kind, pointerId, x] of {fingers}) over.dispatchEvent(new PointerEvent('pointer' + kind,"
+        "{pointerType: 'touch', pointerId, clientX: left + x * width}))})(document.querySelector('.u-over'))"
+    )
+    assert tab.run("Panels.view") == pytest.approx([1.0, 3.0], abs=0.02)
+    tab.run("Panels.back()")
     tab.run("Panels.against(Data.variables[1])")  # a curve with one gap, at its jump
     tab.until("Panels.panels[0].x?.name === 'a.turned'")
     assert texts(tab, ".below")[0].startswith("a.turned [rad]")

@@ -56,7 +56,7 @@
   };
   for (const [id, call] of Object.entries(calls)) $(id).onclick = call;
   addEventListener("keydown", (event) => {
-    if (event.target.tagName === "INPUT" && event.target.type === "search") return;
+    if (event.target.type === "search" || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = {ArrowLeft: -1, ArrowRight: 1}[event.key], [low, high] = Panels.times();
     if (event.key === "f") Panels.fit();
     else if (event.key === "Backspace") Panels.back();

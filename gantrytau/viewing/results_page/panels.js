@@ -53,7 +53,9 @@ const Panels = (() => {
   self.toggle = async (variable, asCurve = false) => {
     if (self.shown(variable) && !asCurve) return self.remove(variable);
     if (variable.modes && !asCurve) {
-      self.bands.push({variable, curves: await curves(variable), shade: !self.bands.some((band) => band.shade)});
+      const band = {variable, curves: [], shade: !self.bands.some((one) => one.shade)};
+      self.bands.push(band);
+      band.curves = await curves(variable);
       return self.layout();
     }
     let panel = self.active;
@@ -217,6 +219,7 @@ const Panels = (() => {
     }, [[0, 1], [null, null]], element);
     u.over.addEventListener("dblclick", self.fit);
     u.over.addEventListener("wheel", (event) => wheel(panel, u, event), {passive: false});
+    fingers(panel, u);
     let pressed = null;
     u.over.addEventListener("mousedown", (event) => (pressed = [event.clientX, event.clientY]));
     u.over.addEventListener("click", (event) => {
@@ -265,6 +268,29 @@ const Panels = (() => {
     if (time === hovered) return;
     hovered = time;
     self.readings();
+  }
+
+  // one finger moves, two fingers zoom: what is under a finger stays under it
+  function fingers(panel, u) {
+    const at = new Map();
+    const value = (px) => u.posToVal(px - u.over.getBoundingClientRect().left, "x");
+    u.over.addEventListener("pointerdown", (event) => {
+      if (event.pointerType !== "touch") return;
+      if (!at.size) self.past.push(state());
+      at.set(event.pointerId, event.clientX);
+    });
+    u.over.addEventListener("pointermove", (event) => {
+      if (!at.has(event.pointerId)) return;
+      const {left, width} = u.over.getBoundingClientRect(), held = [...at.values()].slice(0, 2).map(value);
+      at.set(event.pointerId, event.clientX);
+      const [p, q] = [...at.values()].slice(0, 2).map((px) => (px - left) / width), [x] = panel.range;
+      const span = at.size > 1 && Math.abs(q - p) > 0.02 ? (held[1] - held[0]) / (q - p) : x[1] - x[0];
+      if (!(span > 0)) return;
+      self.zoom([held[0] - p * span, held[0] + (1 - p) * span], panel);
+      self.past.pop();
+    });
+    for (const end of ["pointerup", "pointercancel", "pointerleave"])
+      u.over.addEventListener(end, (event) => at.delete(event.pointerId));
   }
 
   self.pin = (time, which, quietly = false) => {
