@@ -160,7 +160,9 @@ def _shapes(instance: Instance, absent: Mapping[str, str]) -> tuple[Shape, ...]:
 def _said(instance: Instance) -> dict[str, Any]:
     """What the components say of themselves beside their equations."""
     unchecked = frozenset(path for path, one in instance.components if not one.checks_units)
-    return dict(rods=rods_of(instance.root), unchecked=unchecked, experiment=instance.root.experiment)
+    return dict(
+        rods=rods_of(instance.root), unchecked=unchecked, experiment=instance.root.annotated_experiment
+    )
 
 
 def _kinds(placed: Sequence[Placed]) -> dict[str, str]:

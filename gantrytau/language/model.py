@@ -19,13 +19,9 @@ class _Part:
     """What a class body may hold besides quantities and arrays."""
 
 
-INNER = {
-    "chosen_starts",
-    "drawn",
-    "members",
-    "open",
-    "shapes",
-}  # names that are not offered behind a component
+INNER = frozenset(  # names that are not offered behind a component
+    "annotated_experiment checks_units chosen_starts drawn first_index inner_names members open shaped shapes".split()
+)
 _PARTS = (Quantity, _Part)
 
 
@@ -172,7 +168,9 @@ class Model(Declared):
     """
 
     drawn = True  # whether pictures show it and what is in it
-    experiment: ClassVar[Mapping[str, float]] = {}  # what its author says of a simulation: `StopTime`, s
+    annotated_experiment: ClassVar[
+        Mapping[str, float]
+    ] = {}  # what its author says of a simulation: `StopTime`, s
 
     def equations(self) -> Iterator[Any]:
         """Equations (`a == b`) and connections (`connect(a, b)`), one per yield."""

@@ -68,7 +68,7 @@ def test_an_option_is_made_from_the_argument_it_stands_for():
         found.update(policy)
 
     options = {p.name: p for p in get_command(alone).params}
-    assert options["stop"].required
+    assert not options["stop"].required
     assert options["limits"].default == "warn"
     assert options["max_step"].opts == ["--max-step"]
     get_command(alone)(["--stop", "2", "--limits", "none"], standalone_mode=False)

@@ -134,7 +134,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     if _is_connector(structure):
         return type(scope.definition.name, (base or ModelicaConnector,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
-    body["experiment"] = experiment_of(structure)
+    body["annotated_experiment"] = experiment_of(structure)
     return type(scope.definition.name, (base or ModelicaModel,), body)
 
 
