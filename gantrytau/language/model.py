@@ -19,9 +19,9 @@ class _Part:
     """What a class body may hold besides quantities and arrays."""
 
 
-INNER = frozenset(  # names that are not offered behind a component
-    "annotated_experiment checks_units chosen_starts drawn first_index inner_names members open shaped shapes".split()
-)
+# names that are not offered behind a component
+INNER = {"annotated_experiment", "checks_units", "chosen_starts", "drawn", "first_index"}
+INNER |= {"inner_names", "members", "open", "shaped", "shapes"}
 _PARTS = (Quantity, _Part)
 
 
