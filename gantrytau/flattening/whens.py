@@ -16,7 +16,7 @@ import numpy as np
 from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel, When
 from gantrytau.flattening.instants import declared, sized
-from gantrytau.language.events import Happening, Reinit, Terminate, WhenChain
+from gantrytau.language.events import Happening, Reinit, Terminate, WhenChain, refuse_change
 from gantrytau.language.functions import plain_condition
 from gantrytau.language.statements import equality, place_of
 from gantrytau.language.symbols import Symbols, scalars
@@ -97,6 +97,7 @@ def condition_of(value: Any, symbols: Symbols, held: Collection[str], place: str
             "variables or the time; what is done at the start is a start value"
         )
     _refuse_no_condition(condition, kinds, place)
+    refuse_change(condition, place)
     return condition
 
 

@@ -96,6 +96,18 @@ def when(condition: Any, *actions: Any) -> WhenChain:
     return WhenChain((Happening(condition, actions),))
 
 
+def refuse_change(condition: ca.SX, place: str = "") -> None:
+    """ModelError for a condition that is true at an instant only, as n > pre(n): it is looked at between instants."""
+    names = {symbol.name() for symbol in ca.symvar(condition)}
+    for name in sorted(names):
+        if f"pre({name})" in names:
+            raise ModelError(
+                f"found {name} beside pre({name}) in the condition of when, which is true at instants of change only and is "
+                f"never seen, expected a condition that stays true; act in the when that changes {name}",
+                place=place,
+            )
+
+
 def reinit(variable: Any, value: Any) -> Reinit:
     """An action of `when`: a state, scalar or vector, takes another value, and what follows from it with it."""
     return Reinit(variable, value)

@@ -88,6 +88,7 @@ def simulate(
     wanted = names(outputs or ())
     dae = _changed(model, parameters, wanted)
     if stop is None:
+        start = start or dae.flat.experiment.get("StartTime", 0.0)
         stop = number("simulate", "stop", dae.flat.experiment.get("StopTime"), unit="s", above=start)
     dae = stopping(dae) if limits == "stop" else dae
     dae = with_starts(dae, starts) if starts else dae

@@ -182,6 +182,30 @@ def test_it_is_a_component_of_a_model_in_python(drive):
     assert np.sum(np.abs(poles) > 1e-6) == 2
 
 
+COUNTED = """model M
+  Boolean late = time > 0.5;
+  Integer n(start=0, fixed=true);
+  Real x;
+  Real y[2] = {x, x};
+equation
+  x = time;
+  when {late, edge(late), time > 0.4} then
+    n = pre(n) + 1;
+  elsewhen time > 0.1 then
+    n = pre(n) + 10;
+  end when;
+  annotation(experiment(StartTime=0.05, StopTime=1));
+end M;
+"""
+
+
+def test_each_condition_of_a_vector_acts_and_a_run_has_the_times_of_the_experiment(tmp_path):
+    (tmp_path / "counted.mo").write_text(COUNTED)
+    found = simulate(load_modelica(tmp_path / "counted.mo")["M"]())
+    assert (found.time[0], found.time[-1], found.final("n")) == (0.05, 1.0, 12)
+    assert found.final("y").tolist() == [1.0, 1.0]
+
+
 WRONG = (  # text of a model, line and column, words
     ("model M\n  Real x = 2 * yy;\n  Real y = 1;\nend M;", "2:16", "found the name 'yy'.*did you mean 'y'"),
     ("model M\n  Rael x;\nend M;", "2:3", "found 'Rael', expected the name of a class; did you mean 'Real'"),
@@ -217,6 +241,11 @@ WRONG = (  # text of a model, line and column, words
         "model M\n  Real x;\nequation\n  if time > 1 then\n    x = 1;\n  end if;\nend M;",
         "4:3",
         "found 1 and 0 equations",
+    ),
+    (
+        "model M\n  Integer n(start=0);\nequation\n  when n > pre(n) then\n    n = pre(n) + 1;\n  end when;\nend M;",
+        "4:3",
+        "found n beside pre\\(n\\) in the condition of when",
     ),
     (
         "model M\n  parameter Integer n = n + 1;\n  Real x[n];\nend M;",

@@ -55,7 +55,7 @@ def tune_pid(
     kind: Kind = "PI",
     *,
     crossover: float | None = None,
-    phase_margin: float = 60.0,
+    phase_margin: float | None = None,
     M_s: float | None = None,
     M_t: float | None = None,
     N: float = 10.0,
@@ -64,17 +64,20 @@ def tune_pid(
 ) -> PidGains:
     """Gains of `Pid` (of `DiscretePid` for a plant with a period) around one output and one input of a plant.
 
-    By margins: crossover in Hz, where the loop has the gain 1 and a phase margin in deg; `.margins`
-    has the smallest of all crossings. By loop shaping, without a
-    crossover: the largest integral gain k / T_i for which |S| stays below M_s (1.4 if neither is given) and |T| below
-    M_t (Astrom, Panagopoulos, Hagglund, Design of PI controllers based on non-convex optimization, Automatica 34, 1998).
+    By margins: crossover in Hz, where the loop has the gain 1 and a phase margin in deg, 60 if none is given; `.margins`
+    has the smallest of all crossings. By loop shaping, without a crossover: the largest integral gain k / T_i for which |S|
+    stays below M_s (1.4 if neither is given) and |T| below M_t (Astrom, Panagopoulos, Hagglund, Design of PI controllers
+    based on non-convex optimization, Automatica 34, 1998).
     A PID has T_i = 4 T_d. k is below zero for a plant that answers downwards. output, input: names, where there are
     several. Raises ModelError for wrong arguments, a phase that the kind cannot give, and where no gains make a stable loop.
     """
     place = "tune_pid"
     check_words(tune_pid, dict(kind=kind))
     hertz = None if crossover is None else number(place, "crossover", crossover, unit="Hz", above=0)
-    phase_margin = number(place, "phase_margin", phase_margin, above=0, below=180)
+    if phase_margin is not None and hertz is None:
+        words = "expected a crossover in Hz beside it; without one, M_s and M_t bound the loop"
+        raise ModelError(words, place=place, found=Given("phase_margin", phase_margin))
+    margin = number(place, "phase_margin", 60.0 if phase_margin is None else phase_margin, above=0, below=180)
     peaks = {
         name: number(place, name, M, above=1) for name, M in (("M_s", M_s), ("M_t", M_t)) if M is not None
     }
@@ -87,7 +90,7 @@ def tune_pid(
             raise ModelError(words, place=place, found=Given(*next(iter(peaks.items()))))
         if plant.period is not None:
             number(place, "crossover", hertz, unit="Hz", below=0.5 / plant.period)
-        return _by_margins(design, hertz, phase_margin)
+        return _by_margins(design, hertz, margin)
     if kind == "PD":
         words = "expected a crossover in Hz: loop shaping looks for the most integral gain, and a PD has none"
         raise ModelError(words, place=place, argument="crossover")
@@ -193,10 +196,10 @@ def _by_shaping(design: _Design, M_s: float, M_t: float) -> PidGains:
         if not np.any(found > 0):
             continue
         i = int(np.argmax(found))
-        if i == TIMES - 1:
+        if i == TIMES - 1 or np.isinf(found[i]):
             words = (
-                "expected a crossover in Hz: the integral gain rises without end as the times shrink, and no dynamics of "
-                "the plant limit it; add those of the actuator, the filter or the sampling, or give a crossover"
+                "expected a crossover in Hz: the integral gain rises without end, and no dynamics of the plant limit it; "
+                "add those of the actuator, the filter or the sampling, or give a crossover"
             )
             raise ModelError(words, place="tune_pid", argument="crossover")
         ends = np.log(times[[min(i + 1, TIMES - 1), max(i - 1, 0)]])
@@ -217,7 +220,9 @@ def _most_gain(
     crossovers: np.ndarray,
     most: tuple[float, float],
 ) -> float:
-    """The largest gain within M_s and M_t for a loop that is `shape` (N,) with a gain of one; 0 if there is none."""
+    """The largest gain within M_s and M_t for a loop that is `shape` (N,) with a gain of one; 0 if there is none, infinite
+    if they hold beyond the dynamics of the plant.
+    """
     from scipy.optimize import brentq
 
     known = np.isfinite(shape) & (shape != 0)
@@ -234,7 +239,9 @@ def _most_gain(
     for i in np.flatnonzero(held)[::-1]:
         if not design.stable(sign * float(gains[i]), time):
             continue
-        if i + 1 == GAINS or held[i + 1]:  # beyond, it is another loop
+        if i + 1 == GAINS:
+            return np.inf
+        if held[i + 1]:  # beyond, it is another loop
             return float(gains[i])
         return brentq(excess, gains[i], gains[i + 1], xtol=1e-12 * gains[i])
     return 0.0

@@ -120,17 +120,18 @@ def load_modelica(
     """
     if not paths:
         raise ModelError("load_modelica: found no file, expected at least one, as load_modelica('robot.mo')")
-    folders = [
-        Path(p) for p in (*libraries, *filter(None, os.environ.get("MODELICAPATH", "").split(os.pathsep)))
-    ]
-    for folder in folders:
+    given = [Path(p) for p in ([libraries] if isinstance(libraries, str | os.PathLike) else libraries)]
+    others = [Path(p) for p in os.environ.get("MODELICAPATH", "").split(os.pathsep) if p]
+    for folder in given:
         if not folder.is_dir():
             raise ModelError(
                 "found no folder of this name, expected one that holds packages",
                 place=str(folder),
                 argument="libraries",
             )
-    return ModelicaLibrary([Path(p) for p in paths], folders)
+    return ModelicaLibrary(
+        [Path(p) for p in paths], [*given, *(folder for folder in others if folder.is_dir())]
+    )
 
 
 def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:

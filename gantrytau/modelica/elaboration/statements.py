@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.events import Happening, WhenChain, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_not, logic_or
+from gantrytau.language.events import Happening, WhenChain, refuse_change, reinit, terminate
+from gantrytau.language.functions import floor, if_else, logic_not
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
@@ -128,7 +128,13 @@ def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
                 f"found {left} = {right}, which never holds, expected an equation with a variable"
             )
         return
-    yield ca.SX(left), ca.SX(right)
+    left, right = ca.SX(left), ca.SX(right)
+    if any(one.numel() > 1 and len(set(map(hash, one.elements()))) == 1 for one in (left, right)):
+        yield from zip(
+            left.elements(), right.elements(), strict=True
+        )  # not taken for a scalar beside a vector
+    else:
+        yield left, right
 
 
 def _member(value: Any, name: str) -> Any:
@@ -225,11 +231,14 @@ def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
             raise ModelError(
                 "found initial() in 'when', which is not supported, expected an initial equation beside it"
             )
-        found = [reader.value(one) for one in conditions]
-        sampled = any(sample_calls(test))
-        words = "" if not sampled else "sample"
-        joined = logic_or(*map(values.condition, found)) if len(found) > 1 else values.condition(found[0])
-        yield Happening(joined, tuple(_actions(items, reader)), words, sampled)
+        actions = tuple(_actions(items, reader))
+        for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
+            edge = cast(tree.Call, one).arguments[0] if _is_call(one, "edge") else one
+            found = values.condition(reader.value(edge))
+            if isinstance(found, ca.SX):
+                refuse_change(found)
+            sampled = any(sample_calls(one))
+            yield Happening(found, actions, "sample" if sampled else "", sampled)
 
 
 def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:

@@ -71,7 +71,9 @@ def test_stated_margins_are_met_and_components_make_the_same_loop(kind, crossove
         (lambda: tune_pid(SERVO, crossover=2.0), "crossover"),
         (lambda: tune_pid(SERVO, "PD"), "crossover"),
         (lambda: tune_pid(StateSpace(-1, 1, 1)), "crossover"),
+        (lambda: tune_pid(SERVO, phase_margin=50.0), "phase_margin"),
         (lambda: tune_pid(StateSpace([[0, 1], [0, 0]], [0, 1], [1, 0]), M_s=1.5), "M_s"),
+        (lambda: tune_pid(StateSpace([[0, 1], [0, 0]], [0, 1], [1, 0]), "PID", M_s=1.6), "crossover"),
     ],
 )
 def test_what_cannot_be_tuned_is_told_by_its_argument(wrong, argument):

@@ -178,6 +178,32 @@ def test_algebraic_loops_are_played_back():
     assert optimum.playback.objective == pytest.approx(optimum.objective, abs=1e-7)
 
 
+class OnACircle(Optimization):
+    """A pendulum of index three, one algebraic variable of which has a closed form."""
+
+    x = Real(start=0.0, fixed=True)
+    y = Real(start=-1.0)
+    v = Real(start=1.0, fixed=True)
+    w = Real()
+    force = Real()
+    u = Input(min=-2.0, max=2.0)
+
+    def equations(self):
+        yield der(self.x) == self.v
+        yield der(self.y) == self.w
+        yield der(self.v) == -self.force * self.x + self.u
+        yield der(self.w) == -self.force * self.y - 9.81
+        yield self.x**2 + self.y**2 == 1
+
+    def integrand(self):
+        return self.u**2 + self.x**2
+
+
+def test_a_single_algebraic_in_closed_form_is_played_back():
+    optimum = optimize(OnACircle, elements=8)
+    assert optimum.playback.objective == pytest.approx(0.04992519914, rel=1e-8)  # of 40 elements
+
+
 class Begun(Optimization):
     """Begin where the eccentric anomaly is 0.2, at a speed near 1."""
 

@@ -243,7 +243,10 @@ def _system(built: Built, trajectory: Trajectory, pieces: int) -> _System:
     old, new = ca.vertcat(problem.time, *inputs), ca.vertcat(begin + place * span, *courses)
     ode, *residuals, algebraics = ca.substitute(parts, [old], [new])
     x = ca.vertcat(ca.SX(0, 1), *(s.symbol for s in phase.states))
-    z, p = every[kept], ca.vertcat(values, begin, span, problem.numbers)
+    z, p = (
+        ca.vertcat(ca.SX(0, 1), *(every[i] for i in kept)),
+        ca.vertcat(values, begin, span, problem.numbers),
+    )
     rates = ode * span
     calls = SWEEPS * PLACES.size * pieces
 
