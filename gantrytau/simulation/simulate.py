@@ -57,7 +57,7 @@ def simulate(
 ) -> Result:
     """Simulate a model from its start values and return all its variables over time.
 
-    start, stop: begin and end of the run, s; without stop the end is that of the model's `experiment`.
+    start, stop: begin and end of the run, s; without stop those of the model's `experiment`.
     inputs: name -> number, function of time, `Samples` ((times, values) for short) or a signal such as `white_noise`; other
     inputs keep their start values.
     parameters: name -> value, in place of the model's. Starts become consistent anew: those not fixed move as little as
@@ -88,8 +88,7 @@ def simulate(
     wanted = names(outputs or ())
     dae = _changed(model, parameters, wanted)
     if stop is None:
-        start = start or dae.flat.experiment.get("StartTime", 0.0)
-        stop = number("simulate", "stop", dae.flat.experiment.get("StopTime"), unit="s", above=start)
+        start, stop = _of_experiment(dae.flat.experiment, start)
     dae = stopping(dae) if limits == "stop" else dae
     dae = with_starts(dae, starts) if starts else dae
     signals = read_signals(inputs or {}, dae.flat, (start, stop), seed)
@@ -100,6 +99,12 @@ def simulate(
         if doubt:
             warnings.warn(f"{dae.name}: {doubt}", DoubtfulResult, stacklevel=2)
     return result
+
+
+def _of_experiment(said: Mapping[str, float], start: float) -> tuple[float, float]:
+    """Begin and end of a run as the model says them; ModelError where it does not."""
+    start = start or said.get("StartTime", 0.0)
+    return start, number("simulate", "stop", said.get("StopTime"), unit="s", above=start)
 
 
 def checked_policy(place: str, given: Mapping[str, Any]) -> dict[str, Any]:
