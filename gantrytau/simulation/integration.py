@@ -122,7 +122,7 @@ class Run:
                 try:
                     turned = self._advance(count)
                 except RuntimeError as error:
-                    if "IDACalcIC" in str(error) and self.integrators.rounded(trail.z[self.done]):
+                    if self.integrators.rounded(error, trail.z[self.done]):
                         continue
                     if self.integrators.tolerance < self.enough:
                         self.integrators.tolerance = self.enough

@@ -18,6 +18,7 @@ from gantrytau.simulation.singular_poses import Point
 MOST_STEPS = 100_000  # of the integrator between two ends
 BRIEF = 1e-5  # of an interval: longer steps are left to the integrator
 SHORT = 1e-12  # of a state, or of its size: change of the rates within a step of second order
+WORST = 100.0  # times the largest algebraic: rounding errors that are borne near a singular pose
 FINEST = 5e-16  # tolerance that CVODES takes
 WALKED_STEPS = 5_000  # of the integrator in one step of the walk to where it ends
 
@@ -58,7 +59,12 @@ class Integrators:
         found = self._short(point, step, when, w)
         if found is None:
             p, u = ([], [t, step, 0, *inputs]) if self.coordinates.stepwise else ([t, step], [])
-            found = self._integrate(1, most, x, z, p, u)
+            while found is None:
+                try:
+                    found = self._integrate(1, most, x, z, p, u)
+                except RuntimeError as error:
+                    if not self.rounded(error, z):
+                        raise
         near, far = found
         near = self.coordinates.project(near, when, w)
         return near[0], self.coordinates.settle(near, far, when, w)[0], t + step, there
@@ -97,14 +103,17 @@ class Integrators:
         finally:
             self.working = False
 
-    def rounded(self, z: np.ndarray) -> bool:
-        """Whether small algebraics may have the rounding errors of large ones, which they did not so far.
+    def rounded(self, error: RuntimeError, z: np.ndarray) -> bool:
+        """Whether algebraics may have larger rounding errors than so far, where an integrator gave up for them.
 
         What `settle` found solves the equations as well as rounding allows: where large forces decide a small one, the
-        integrator cannot make it better, gives up at once, and is asked for less.
+        integrator cannot make it better, gives up at once, and is asked for less, near a singular pose for less again.
         """
-        before, self.size = self.size, float(np.abs(z).max(initial=1.0))
-        return self.size > before
+        most = float(np.abs(z).max(initial=1.0))
+        if "IDACalcIC" not in str(error) or self.size >= WORST * most:
+            return False
+        self.size = most if self.size < most else 10 * self.size
+        return True
 
     def _count(self, integrator: ca.Function, kernels: dict[str, Kernel]) -> None:
         """Note the steps of an integrator, and how often it called its functions."""
