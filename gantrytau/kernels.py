@@ -92,7 +92,7 @@ class Kernel:
         return True
 
     def _found(self, begin: bool, wait: bool) -> ca.Function | None:
-        """The kernel that is kept; else a process is begun that compiles it, unless another one does."""
+        """The kernel of the cache. Without one, a process is started to compile it, unless another process does so."""
         if not self._key:
             command, folder = _command(self._level), kernel_folder()
             if command is None or folder is None:
@@ -111,7 +111,7 @@ class Kernel:
 
 
 def code_size(function: ca.Function) -> float:
-    """Instructions of a function and of those that it calls; inf where one of them is no more than a library's name."""
+    """The number of instructions of a function, with the functions it calls; inf if one of them lies in a library."""
     if function.class_name() == "External":
         return math.inf
     own = function.n_instructions() if function.is_a("SXFunction") or function.is_a("MXFunction") else 0

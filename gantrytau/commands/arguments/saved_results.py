@@ -31,7 +31,7 @@ class _Saved:
     known: list[str] = field(default_factory=list)
 
     def reads(self, name: str) -> bool:
-        """Whether a variable, or an element of it, is wanted, or a component in which it is, with derivatives."""
+        """Whether a name is wanted: itself, its vector, or a component around it; a derivative counts as its variable."""
         self.known.append(name)
         if not self.wanted or name == "time":
             return True

@@ -92,7 +92,7 @@ def examine() -> Iterator[Checked]:
 
 
 def package(group: str, wanted: Requirement, extra: str = "") -> Checked:
-    """Whether a package is installed and new enough; extra: the command that installs it, where it is optional."""
+    """Whether a package is installed and new enough; extra: the command that installs an optional package."""
     try:
         found = importlib.metadata.version(wanted.name)
     except importlib.metadata.PackageNotFoundError:

@@ -139,7 +139,7 @@ def solve_block(
     guide: Guide,
     still: bool = False,
 ) -> Block:
-    """The solution of one block; `guide` has a number for every symbol in it; still: whether nothing in it switches."""
+    """The solution of one block. guide: a number for every symbol of the block; still: whether nothing switches."""
     x = ca.vertcat(*(symbols[n] for n in unknowns))
     f = ca.vertcat(*(residuals[k] for k in equations))
     smooth = Switched((f,), ()) if still else switched([f], set(unknowns))

@@ -1,4 +1,4 @@
-"""Values that single equations give outright, one after the other: which of them when is a matter of structure alone."""
+"""Start values that follow from single equations, one after the other; the structure alone decides on the order."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,7 +14,7 @@ LINEAR = 1e-9  # of an equation, what may be left of it where it is linear
 
 
 def propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray:
-    """Values without a start computed from those with one, as far as single equations give them outright.
+    """Missing start values, computed from the known ones as far as single equations determine them.
 
     point: numbers of the leaves; missing: places of those without a start.
     """
@@ -59,7 +59,7 @@ class _Rows:
 
 
 class _Straight:
-    """Equations that are linear in what is missing, by their numbers at one point; inside: their entries by that."""
+    """Equations linear in the missing values, as numbers at one point; inside: the derivatives by the missing values."""
 
     def __init__(self, level: Level, point: np.ndarray, inside: np.ndarray):
         self.f, slopes = level.look(point)
@@ -68,7 +68,7 @@ class _Straight:
         self._point = point
 
     def solve(self, found: np.ndarray, unknowns: np.ndarray, equations: np.ndarray, used: np.ndarray) -> None:
-        """Enter the unknown of each of some equations into the numbers, and which of them gave one."""
+        """Solve some equations for one unknown each, write these into the numbers, and tell which equations succeeded."""
         held, begin, own = self._rows.of(equations, unknowns)
         slopes, columns = self._slopes[held], self._columns[held]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -79,7 +79,7 @@ class _Straight:
 
 
 def _solve_curved(level: Level, found: np.ndarray, unknowns: np.ndarray, equations: np.ndarray) -> None:
-    """Enter the unknown of each of some equations into the numbers, where these turn out to be linear in it."""
+    """Solve some equations for one unknown each and write these into the numbers, where an equation is linear in it."""
     x, residual, jacobian = level.symbolic
     held, begin, own = _Rows(*level.entries, len(level.residuals)).of(equations, unknowns)
     residuals, entries = residual.elements(), jacobian.nonzeros()
@@ -102,7 +102,7 @@ def _given(f: np.ndarray, slopes: np.ndarray, begin: np.ndarray, own: np.ndarray
 
 
 def _rounds(rows: Sequence[int], columns: Sequence[int]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Leaves and the equations that give them, one each, in which one leaf is missing after those of the rounds before.
+    """Pairs of a leaf and an equation for it, by rounds: in its round an equation lacks that leaf only.
 
     rows, columns: of the entries by missing leaves. Where no equation is left with a single one, the leaf in most equations
     stays as it is: the coordinate of a joint is in several, each with another unknown.

@@ -112,15 +112,7 @@ class Execution:
 
     def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
         """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
-        tests: list[tuple[Any, Items]] = []
-        last: Items = item.otherwise or ()
-        for test, items in item.branches:
-            known = values.tested(reader.value(test))
-            if isinstance(known, ca.SX):
-                tests.append((known, items))
-            elif known:
-                last = items
-                break
+        tests, last = reader.open_branches(item.branches, item.otherwise or ())
         if not tests:
             self.run(last, local)
             return

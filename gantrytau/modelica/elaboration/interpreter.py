@@ -137,16 +137,21 @@ class Interpreter:
         count = int(np.floor((stop - start) / step + 1e-9)) + 1
         return values.array([start + k * step for k in range(max(count, 0))])
 
-    def _conditional(self, e: tree.Conditional) -> Any:
+    def open_branches(
+        self, branches: Sequence[tuple[Any, Any]], last: Any
+    ) -> tuple[list[tuple[Any, Any]], Any]:
+        """Branches of an `if` whose conditions vary, with the conditions, and the branch that acts where none holds."""
         tests: list[tuple[Any, Any]] = []
-        otherwise: Any = e.otherwise
-        for test, then in e.branches:
+        for test, then in branches:
             known = values.tested(self.value(test))
             if isinstance(known, ca.SX):
                 tests.append((known, then))
             elif known:
-                otherwise = then
-                break
+                return tests, then
+        return tests, last
+
+    def _conditional(self, e: tree.Conditional) -> Any:
+        tests, otherwise = self.open_branches(e.branches, e.otherwise)
         found = self.value(otherwise)
         for test, then in reversed(tests):
             found = values.chosen(test, self.value(then), found, self.quiet)

@@ -167,15 +167,7 @@ def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
 
 def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     """An `if` among equations: what is known chooses, else the sides are chosen at all times."""
-    tests: list[tuple[Any, Items]] = []
-    last: Items = item.otherwise or ()
-    for test, items in item.branches:
-        known = values.tested(reader.value(test))
-        if isinstance(known, ca.SX):
-            tests.append((known, items))
-        elif known:
-            last = items
-            break
+    tests, last = reader.open_branches(item.branches, item.otherwise or ())
     if not tests:
         yield from stated(last, reader)
         return
