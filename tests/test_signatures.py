@@ -16,7 +16,7 @@ DOORS = (
     "gantrytau",
     "gantrytau.kinematics",
     "gantrytau.viewing",
-    "gantrytau.mechanics.urdf",
+    "gantrytau.mechanics.robot_files",
     "gantrytau_models",
     "gantrytau_models.leadthrough",
     "gantrytau_optimica",

@@ -16,7 +16,7 @@ from typing import Any
 from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean, python_error, user_lines
 
 _PYTHON = re.compile(r"(?P<file>.+\.(?:py|mo))(?::(?P<name>.*))?", re.DOTALL)
-_URDF = re.compile(r"(?P<file>.+\.urdf)(?P<name>)", re.IGNORECASE | re.DOTALL)
+_ROBOT = re.compile(r"(?P<file>.+\.(?:urdf|xml|mjcf|sdf))(?P<name>)", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(r"(?P<place>.+?)\s*\((?P<arguments>[^()]*)\)", re.DOTALL)
 
 
@@ -35,13 +35,13 @@ class NamedObject:
     @staticmethod
     def read(text: str, folder: Path | None = None) -> "NamedObject":
         """`Pendulum`, `GantryTau(D1)`, `package.module:Class`, `robot.py:Robot(m=2.5)`, `robot.py`, `robot.urdf`,
-        `robot.mo:Package.Model`.
+        `robot.xml` of MuJoCo, `robot.mo:Package.Model`.
 
         folder: the one that paths are relative to; None for the current one.
         """
         call = _CALL.fullmatch(text.strip())
         place, arguments = (call["place"], call["arguments"]) if call else (text.strip(), "")
-        found = _PYTHON.fullmatch(place) or _URDF.fullmatch(place)
+        found = _PYTHON.fullmatch(place) or _ROBOT.fullmatch(place)
         file = Path(folder or "", found["file"]).absolute() if found else None
         name = (found["name"] or "") if found else place.removeprefix("gantrytau_models.")
         return NamedObject(name.strip(), file, listed([arguments]))

@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-FILES = Path(__file__).parents[1] / "mechanics" / "urdf"
+FILES = Path(__file__).parents[1] / "mechanics" / "robot_files"
 
 
 def test_a_urdf_file_is_a_model_with_the_loops_beside_it(run, tmp_path):

@@ -26,6 +26,7 @@ from gantrytau.commands.printing.reporting import CommandError, note, refusing
 from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
+ROBOT_FILES = (".urdf", ".mjcf", ".xml")
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,8 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     """The model that MODEL, `--prototype` and `--set` describe; CommandError with a remedy if there is none."""
     choice = NamedObject.read(text)
     wanted = _wanted(choice, text, robot)
-    if choice.file and choice.file.suffix.lower() == ".urdf":
-        found = _in_urdf(choice.file, kind)
+    if choice.file and choice.file.suffix.lower() in ROBOT_FILES:
+        found = _in_robot_file(choice.file, kind)
     elif choice.file and choice.file.suffix == ".mo":
         found = _in_text(choice.file, choice.name, kind)
     else:
@@ -222,12 +223,14 @@ def _in_file(file: Path, name: str, kind: Kind) -> Any:
     return _checked(getattr(module, name), f"{file.name}:{name}", kind)
 
 
-def _in_urdf(file: Path, kind: Kind) -> type[Model]:
-    """The robot of a URDF file, with the loops of `robot.loops.toml` beside `robot.urdf` if that is there."""
-    from gantrytau.mechanics.urdf import read_urdf
+def _in_robot_file(file: Path, kind: Kind) -> type[Model]:
+    """The robot of a file, of URDF with the loops of `robot.loops.toml` beside `robot.urdf` if that is there."""
+    from gantrytau.mechanics.robot_files import read_mjcf, read_urdf
 
     if kind is not MODEL:
         raise CommandError(f"{file.name} is a robot, expected {kind}")
+    if file.suffix.lower() != ".urdf":
+        return read_mjcf(file)
     loops = file.with_suffix(".loops.toml")
     return read_urdf(file, loops if loops.is_file() else None)
 

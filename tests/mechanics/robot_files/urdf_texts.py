@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from gantrytau.mechanics.urdf import UrdfRobot, read_urdf
+from gantrytau.mechanics.robot_files import DescribedRobot, read_urdf
 
 
 def written(folder: Path, body: str, name: str = "robot") -> Path:
@@ -26,5 +26,5 @@ def joint(name: str, kind: str, parent: str, child: str, inside: str = "") -> st
     )
 
 
-def read(folder: Path, body: str, **keywords: Any) -> type[UrdfRobot]:
+def read(folder: Path, body: str, **keywords: Any) -> type[DescribedRobot]:
     return read_urdf(written(folder, body), **keywords)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gantrytau.language.self_description.appearance import Ball, Cuboid, MeshFile, RoundBar, Shape
-from gantrytau.mechanics.urdf.urdf_file import UrdfLink, Visual
+from gantrytau.mechanics.robot_files.robot_description import RobotLink, Visual
 
 READABLE = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off")  # what a viewer reads without further packages
 PACKAGE, FILE = "package://", "file://"
@@ -15,9 +15,9 @@ PACKAGE, FILE = "package://", "file://"
 
 @dataclass(frozen=True)
 class MeshFolders:
-    """Search path for the meshes of a URDF file. packages: folders by the names of packages."""
+    """Search path for the meshes of a file. packages: folders by the names of packages."""
 
-    urdf: str
+    file: str
     packages: Mapping[str, str | os.PathLike[str]]
 
     def find(self, name: str) -> Path | None:
@@ -26,20 +26,20 @@ class MeshFolders:
         return found if found is not None and found.suffix.lower() in READABLE else None
 
     def _candidates(self, name: str) -> Iterator[Path]:
-        above = Path(self.urdf).resolve().parents
+        above = Path(self.file).resolve().parents
         if not name.startswith(PACKAGE):
             yield above[0] / name.removeprefix(FILE)
             return
         package, _, rest = name.removeprefix(PACKAGE).partition("/")
         if package in self.packages:
             yield Path(self.packages[package]) / rest
-        for folder in above:  # a URDF file usually stands in the package, or beside it
+        for folder in above:  # a file usually stands in the package, or beside it
             if folder.name == package:
                 yield folder / rest
             yield folder / package / rest
 
 
-def shapes_of_link(link: UrdfLink, folders: MeshFolders) -> tuple[Shape, ...]:
+def shapes_of_link(link: RobotLink, folders: MeshFolders) -> tuple[Shape, ...]:
     """Shapes of a link; none without <visual>, or where no mesh is found."""
     found = (_shape(visual, folders) for visual in link.visuals)
     return tuple(shape for shape in found if shape is not None)

@@ -10,27 +10,14 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.border.schema import read_toml
-from gantrytau.mechanics.urdf.urdf_file import Placement, UrdfTree
+from gantrytau.mechanics.robot_files.robot_description import (
+    LOOP_KINDS,
+    LoopJoint,
+    Placement,
+    RobotDescription,
+)
 
-KINDS = ("fixed", "revolute", "prismatic", "cylindrical", "universal", "spherical")
 KEYS = ("name", "kind", "link_a", "origin_a", "link_b", "origin_b", "axis", "axis_b")
-
-
-@dataclass(frozen=True)
-class LoopJoint:
-    """A joint between two links of the tree: frame_a is at `origin_a` of link_a, frame_b at `origin_b` of link_b.
-
-    axis: of the joint, in frame_a, of a universal joint the first one; axis_b: its second, in frame_b.
-    """
-
-    name: str
-    kind: str
-    link_a: str
-    link_b: str
-    origin_a: Placement
-    origin_b: Placement
-    axis: tuple[float, ...]
-    axis_b: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -42,7 +29,7 @@ class Closure:
     start: tuple[tuple[str, float], ...] = ()
 
 
-def read_closure(loops: str | os.PathLike[str] | Mapping[str, Any] | None, tree: UrdfTree) -> Closure:
+def read_closure(loops: str | os.PathLike[str] | Mapping[str, Any] | None, tree: RobotDescription) -> Closure:
     """The loop file of a tree, or the same as a dict; ModelError for what is no such thing."""
     if loops is None:
         return Closure()
@@ -67,7 +54,7 @@ def read_closure(loops: str | os.PathLike[str] | Mapping[str, Any] | None, tree:
 @dataclass(frozen=True)
 class _LoopReader:
     file: str
-    tree: UrdfTree
+    tree: RobotDescription
 
     def loop(self, entry: Mapping[str, Any], k: int) -> LoopJoint:
         where = f"loop[{k}]"
@@ -76,7 +63,7 @@ class _LoopReader:
         if not isinstance(name, str) or not name.isidentifier():
             raise self.refusal(f"{where}.name = {name!r}", "a name of letters, digits and underscores")
         kind = entry.get("kind", "spherical")
-        self._one_of(kind, KINDS, f"{where}.kind")
+        self._one_of(kind, LOOP_KINDS, f"{where}.kind")
         links = [link.name for link in self.tree.links]
         for key in ("link_a", "link_b"):
             if key not in entry:
@@ -96,14 +83,14 @@ class _LoopReader:
         if not isinstance(names, (list, tuple)):
             raise self.refusal(f"driven = {names!r}", 'a list of joints, driven = ["q1", "q2"]')
         for name in names:
-            self._one_of(name, [j.name for j in self.tree.joints if j.moves], "driven")
+            self._one_of(name, self.tree.moving, "driven")
         return tuple(names)
 
     def start(self, values: Any) -> tuple[tuple[str, float], ...]:
         if not isinstance(values, Mapping):
             raise self.refusal(f"start = {values!r}", "a table of joints and their coordinates in m and rad")
         for name, value in values.items():
-            self._one_of(name, [j.name for j in self.tree.joints if j.moves], "start")
+            self._one_of(name, self.tree.moving, "start")
             self._numbers([value], 1, f"start.{name}")
         return tuple((name, float(value)) for name, value in values.items())
 

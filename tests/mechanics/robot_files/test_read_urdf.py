@@ -9,11 +9,11 @@ import pytest
 
 from gantrytau import Model, ModelError, Result, connect, flatten, simulate, translate
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
-from gantrytau.mechanics.urdf import read_urdf
+from gantrytau.mechanics.robot_files import read_urdf
 from gantrytau.viewing.film import film_of
 from gantrytau.viewing.solids import solids
 from gantrytau_models import FourBar
-from tests.mechanics.urdf.urdf_texts import joint, link, read
+from tests.mechanics.robot_files.urdf_texts import joint, link, read
 from tests.mechanisms.rows import row
 
 HERE = Path(__file__).parent

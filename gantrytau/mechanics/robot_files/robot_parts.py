@@ -1,4 +1,4 @@
-"""Components that URDF needs besides those of `multibody`: origins, planar joints, joints that mimic others, links."""
+"""Components that files of robots need besides those of `multibody`: origins, planar joints, followers, links."""
 
 from typing import Any
 
