@@ -1,4 +1,4 @@
-"""The hand-written references against Pinocchio, where it is installed (`make bench` needs it)."""
+"""The hand-written references against Pinocchio."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import pytest
 
 from tests.benchmarks import pinocchio_reference
 from tests.references import chain, six_link
-
-pytest.importorskip("pinocchio", reason="Pinocchio (PyPI: pin) is not installed; it is a peer of the bench")
 
 ROBOTS = {
     "nominal": six_link.parameters_L1(),

@@ -26,7 +26,7 @@ from gantrytau.commands.printing.reporting import CommandError, note, refusing
 from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
-ROBOT_FILES = (".urdf", ".mjcf", ".xml")
+ROBOT_FILES = (".urdf", ".mjcf", ".xml", ".sdf")
 
 
 @dataclass(frozen=True)
@@ -225,12 +225,12 @@ def _in_file(file: Path, name: str, kind: Kind) -> Any:
 
 def _in_robot_file(file: Path, kind: Kind) -> type[Model]:
     """The robot of a file, of URDF with the loops of `robot.loops.toml` beside `robot.urdf` if that is there."""
-    from gantrytau.mechanics.robot_files import read_mjcf, read_urdf
+    from gantrytau.mechanics.robot_files import read_mjcf, read_sdf, read_urdf
 
     if kind is not MODEL:
         raise CommandError(f"{file.name} is a robot, expected {kind}")
     if file.suffix.lower() != ".urdf":
-        return read_mjcf(file)
+        return read_sdf(file) if file.suffix.lower() == ".sdf" else read_mjcf(file)
     loops = file.with_suffix(".loops.toml")
     return read_urdf(file, loops if loops.is_file() else None)
 

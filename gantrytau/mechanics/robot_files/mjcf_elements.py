@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from gantrytau.mechanics.robot_files.robot_description import NOWHERE, Placement
+from gantrytau.mechanics.robot_files.robot_description import NOWHERE, Placement, turned
 from gantrytau.mechanics.robot_files.xml_file import XmlFile
 
 GENERATED = ("frame", "replicate", "attach", "composite", "flexcomp")  # what MuJoCo's compiler writes out
@@ -82,16 +82,15 @@ class Orientation:
     sequence: str
 
     @staticmethod
-    def of(xml: XmlFile) -> "Orientation":
+    def of(xml: XmlFile, settings: dict[str, str]) -> "Orientation":
         """What <compiler> says."""
-        found = {key: value for part in xml.top.iterfind("compiler") for key, value in part.attrib.items()}
+        angle = settings.get("angle", "degree")
         part = xml.top.find("compiler")
         if part is not None:
-            xml.known(part, "angle", found.get("angle", "degree"), ("degree", "radian"), "unit")
-            if found.get("coordinate", "local") != "local":
+            xml.known(part, "angle", angle, ("degree", "radian"), "unit")
+            if settings.get("coordinate", "local") != "local":
                 raise xml.refusal(part, 'coordinate="global"', '"local"; MuJoCo has given up the other')
-        sequence = found.get("eulerseq", "xyz")
-        return Orientation(xml, 1.0 if found.get("angle") == "radian" else DEGREE, sequence)
+        return Orientation(xml, 1.0 if angle == "radian" else DEGREE, settings.get("eulerseq", "xyz"))
 
     def placement(self, part: Element) -> Placement:
         """Where an element stands in its body."""
@@ -122,21 +121,13 @@ class Orientation:
 
     def of_quaternion(self, part: Element, q: tuple[float, ...]) -> np.ndarray:
         """The orientation of a quaternion, scalar first, of any length."""
-        w, x, y, z = self._direction(part, q, "quat")
-        return turned(np.array([x, y, z]), 2 * np.arctan2(np.linalg.norm([x, y, z]), w))
+        return Placement.of_quaternion(NOWHERE, tuple(self._direction(part, q, "quat"))).R
 
     def _direction(self, part: Element, numbers: object, key: str) -> np.ndarray:
         length = np.linalg.norm(np.asarray(numbers, dtype=float))
         if not length > 0:
             raise self.xml.refusal(part, f'{key}="{part.get(key)}"', "a direction")
         return np.asarray(numbers, dtype=float) / length
-
-
-def turned(n: np.ndarray, angle: float) -> np.ndarray:
-    """The rotation by an angle about an axis of any length; none about 0 0 0."""
-    length = np.linalg.norm(n)
-    cross = np.cross(np.eye(3), n / length if length > 0 else n)
-    return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
 
 
 def towards(z: np.ndarray) -> np.ndarray:

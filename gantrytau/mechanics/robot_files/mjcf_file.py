@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from gantrytau.mechanics.robot_files.mjcf_elements import Orientation, expanded, turned
+from gantrytau.mechanics.robot_files.mjcf_elements import Orientation, expanded
 from gantrytau.mechanics.robot_files.mjcf_geoms import Geoms
 from gantrytau.mechanics.robot_files.robot_description import (
     NOWHERE,
@@ -24,7 +24,9 @@ from gantrytau.mechanics.robot_files.robot_description import (
     RobotJoint,
     RobotLink,
     RobotSensor,
+    turned,
 )
+from gantrytau.mechanics.robot_files.shape_inertia import link_of
 from gantrytau.mechanics.robot_files.visual_shapes import MeshFolders
 from gantrytau.mechanics.robot_files.xml_file import XmlFile
 
@@ -40,13 +42,16 @@ SENSORS = {  # kind of sensor -> the attribute with the name of what it is at, w
 READ = "compiler option size default asset worldbody equality actuator sensor include"
 PASSED = "solref solimp margin group class user name rgba material"  # numerics and looks
 OF_JOINTS = "type pos axis range limited damping frictionloss armature stiffness springref ref"
+MASSES = "balanceinertia boundmass boundinertia settotalmass"  # settings that change them
 OF_BALLS = "type pos"
 
 
 def read_mjcf_file(file: str | os.PathLike[str], folders: MeshFolders) -> RobotDescription:
     """The robot of an MJCF file; ModelError for one that cannot be read, or says what no robot can do."""
     xml = expanded(XmlFile.read(file, "MJCF", "mujoco", "<worldbody>"))
-    reader = _Reader(xml, Orientation.of(xml), Geoms.of(xml, folders))
+    settings = {key: value for part in xml.top.iterfind("compiler") for key, value in part.attrib.items()}
+    orientation = Orientation.of(xml, settings)
+    reader = _Reader(xml, settings, orientation, Geoms(xml, orientation, folders, settings))
     reader.body(xml.one(xml.top, "worldbody"), "world", Placement())
     xml.different("bodies or sites", [link.name for link in reader.links])
     xml.different("joints", [joint.name for joint in reader.joints])
@@ -75,6 +80,7 @@ class _Reader:
     """Elements of a file as records, as they come; poses: of bodies and sites in the world, as they are written."""
 
     xml: XmlFile
+    settings: dict[str, str]
     orientation: Orientation
     geoms: Geoms
     links: list[RobotLink] = field(default_factory=list)
@@ -113,14 +119,14 @@ class _Reader:
 
     def _link(self, part: Element, name: str) -> RobotLink:
         xml, inertial = self.xml, part.find("inertial")
-        visuals = self.geoms.visuals(part, self.orientation)
-        if part.tag == "worldbody":
+        shapes = [self.geoms.shape(one) for one in part.iterfind("geom")]
+        visuals = tuple(shape for shape in shapes if shape is not None)
+        way = self.settings.get("inertiafromgeom", "auto")
+        if part.tag == "worldbody" or (inertial is None and way == "false"):
             return RobotLink(name, visuals=visuals)
-        if inertial is None or self.geoms.always:
-            lump = self.geoms.lump(part, self.orientation)
-            if lump is None:
-                return RobotLink(name, visuals=visuals)
-            return RobotLink(name, lump.m, _rows(lump.J), Placement(tuple(lump.r)), visuals)
+        if inertial is None or way == "true":
+            lumps = list(self.geoms.lumps(part))
+            return link_of(name, lumps, visuals) if lumps else RobotLink(name, visuals=visuals)
         m = xml.number(inertial, "mass")
         if m < 0:
             raise xml.refusal(inertial, f"mass = {m:g} kg", "none below 0")
@@ -184,7 +190,7 @@ class _Reader:
         if (
             part.get("range") is None
             or limited == "false"
-            or (limited == "auto" and not self.geoms.autolimits)
+            or (limited == "auto" and self.settings.get("autolimits") == "false")
         ):
             return None
         low, high = self.xml.numbers(part, "range", 2)
@@ -289,7 +295,7 @@ class _Reader:
         for part in self.xml.top:
             if part.tag not in READ.split():
                 self._leave(part)
-        self.left_out.extend(self.geoms.left_out)
+        self.left_out.extend(f"mujoco/compiler: {key}" for key in MASSES.split() if key in self.settings)
 
     def _leave(self, part: Element) -> None:
         self.left_out.append(self.xml.paths[part])
@@ -308,7 +314,3 @@ def _moved(kind: str, axis: tuple[float, ...], q: float) -> Placement:
     if kind == "prismatic":
         return Placement(tuple(q * np.array(axis) / np.linalg.norm(axis)))
     return Placement.of(NOWHERE, turned(np.array(axis), q))
-
-
-def _rows(J: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(map(float, row)) for row in J)

@@ -1,4 +1,4 @@
-"""`read_urdf`, `read_mjcf`: robots from files as classes of components."""
+"""`read_urdf`, `read_mjcf`, `read_sdf`: robots from files as classes of components."""
 
 import os
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ from gantrytau.mechanics.robot_files.loop_file import read_closure
 from gantrytau.mechanics.robot_files.mjcf_file import read_mjcf_file
 from gantrytau.mechanics.robot_files.robot_class import DescribedRobot, robot_class
 from gantrytau.mechanics.robot_files.robot_description import RobotDescription
+from gantrytau.mechanics.robot_files.sdf_file import read_sdf_file
 from gantrytau.mechanics.robot_files.urdf_file import read_urdf_file
 from gantrytau.mechanics.robot_files.visual_shapes import MeshFolders
 
@@ -58,6 +59,19 @@ def read_mjcf(file: File, *, packages: Folders = None, driven: Names = None) -> 
     """
     folders = MeshFolders(os.fspath(file), packages or {})
     return _made(read_mjcf_file(file, folders), packages, driven, "read_mjcf")
+
+
+def read_sdf(file: File, *, packages: Folders = None, driven: Names = None) -> type[DescribedRobot]:
+    """The robot of an SDF file, Gazebo's own, as a class: `Arm = read_sdf("arm.sdf")`.
+
+    All is as with `read_urdf`; joints may close loops, a ball joint is `Spherical`, what no joint ties to the world moves
+    freely. `Arm.left_out` has the paths of what the model has not, such as sensors and plugins.
+
+    packages: folders of what is written `model://name/` or `package://name/`; driven: names of joints, else all that move
+    and follow no other. Raises ModelError for what is no SDF, or holds several models. http://sdformat.org/spec
+    """
+    folders = MeshFolders(os.fspath(file), packages or {})
+    return _made(read_sdf_file(file, folders), packages, driven, "read_sdf")
 
 
 def _made(robot: RobotDescription, packages: Folders, driven: Names, reader: str) -> type[DescribedRobot]:

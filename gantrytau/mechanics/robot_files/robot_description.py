@@ -26,6 +26,11 @@ class Placement:
         pitch, yaw = np.arctan2(-rest[2, 0], rest[2, 2]), np.arctan2(-rest[0, 1], rest[1, 1])
         return Placement(tuple(map(float, r)), (float(roll), float(pitch), float(yaw)))
 
+    @staticmethod
+    def of_quaternion(r: Iterable[float], q: tuple[float, ...]) -> "Placement":
+        """The pose of an origin r (3,) and a quaternion, scalar first, of any length."""
+        return Placement.of(r, turned(np.array(q[1:]), 2 * np.arctan2(np.linalg.norm(q[1:]), q[0])))
+
     @property
     def R(self) -> np.ndarray:
         """Its orientation, (3, 3): columns are its axes."""
@@ -46,6 +51,13 @@ class Placement:
         return Placement.of(-self.R.T @ self.xyz, self.R.T)
 
 
+def turned(n: np.ndarray, angle: float) -> np.ndarray:
+    """The rotation by an angle about an axis of any length; none about 0 0 0."""
+    length = np.linalg.norm(n)
+    cross = np.cross(np.eye(3), n / length if length > 0 else n)
+    return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+
+
 def _about_x(angle: float) -> np.ndarray:
     a, x = np.cos(angle), np.sin(angle)
     return np.array([[1, 0, 0], [0, a, -x], [0, x, a]])
@@ -53,8 +65,8 @@ def _about_x(angle: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Visual:
-    """Shape of a link. kind: box, with size (3,) m; cylinder, along z, with size (radius, length); sphere, (radius,);
-    mesh, with its file and size (3,), m for a unit of the file.
+    """Shape of a link. kind: box, with size (3,) m; cylinder or, without its caps, capsule, along z, with size (radius,
+    length); sphere, (radius,); ellipsoid, with its semi-axes; mesh, with its file and size (3,), m for a unit of the file.
     """
 
     kind: str

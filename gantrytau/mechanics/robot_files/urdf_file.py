@@ -164,7 +164,7 @@ class _Reader:
         if shape.tag == "box":
             return Visual("box", placement, xml.numbers(shape, "size", 3))
         if shape.tag == "cylinder" or shape.tag == "capsule":
-            return Visual("cylinder", placement, (xml.number(shape, "radius"), xml.number(shape, "length")))
+            return Visual(shape.tag, placement, (xml.number(shape, "radius"), xml.number(shape, "length")))
         if shape.tag == "sphere":
             return Visual("sphere", placement, (xml.number(shape, "radius"),))
         xml.known(part, "the shape", shape.tag, ("box", "cylinder", "sphere", "mesh"), "shape")

@@ -10,7 +10,7 @@ from gantrytau.language.self_description.appearance import Ball, Cuboid, MeshFil
 from gantrytau.mechanics.robot_files.robot_description import RobotLink, Visual
 
 READABLE = (".stl", ".obj", ".ply", ".glb", ".gltf", ".off")  # what a viewer reads without further packages
-PACKAGE, FILE = "package://", "file://"
+PACKAGES, FILE = ("package", "model"), "file://"
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,11 @@ class MeshFolders:
 
     def _candidates(self, name: str) -> Iterator[Path]:
         above = Path(self.file).resolve().parents
-        if not name.startswith(PACKAGE):
+        scheme, _, path = name.partition("://")
+        if scheme not in PACKAGES:
             yield above[0] / name.removeprefix(FILE)
             return
-        package, _, rest = name.removeprefix(PACKAGE).partition("/")
+        package, _, rest = path.partition("/")
         if package in self.packages:
             yield Path(self.packages[package]) / rest
         for folder in above:  # a file usually stands in the package, or beside it
@@ -50,9 +51,11 @@ def _shape(visual: Visual, folders: MeshFolders) -> Shape | None:
     turned = dict(where, turn=visual.placement.R)
     if visual.kind == "box":
         return Cuboid(size=visual.size, **turned)
-    if visual.kind == "cylinder":
+    if visual.kind in ("cylinder", "capsule"):
         return RoundBar(radius=visual.size[0], length=visual.size[1], **turned)
     if visual.kind == "sphere":
         return Ball(radius=visual.size[0], **where)
+    if visual.kind == "ellipsoid":
+        return None
     file = folders.find(visual.file)
     return None if file is None else MeshFile(file=str(file), scale=visual.size, **turned)

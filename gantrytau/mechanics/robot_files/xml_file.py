@@ -77,13 +77,15 @@ class XmlFile:
         assert part is not None
         return self.read_numbers(part, self.word(part, key), count, f'{key}="{part.get(key)}"')
 
-    def read_numbers(self, part: Element, text: str, count: int, shown: str) -> tuple[float, ...]:
-        """A text as so many finite numbers."""
+    def read_numbers(
+        self, part: Element, text: str, count: int, shown: str, finite: bool = True
+    ) -> tuple[float, ...]:
+        """A text as so many numbers, finite ones unless infinity is allowed."""
         try:
             found = tuple(float(word) for word in text.split())
         except ValueError:
             found = ()
-        if len(found) != count or not all(map(math.isfinite, found)):
+        if len(found) != count or any(math.isnan(x) or (finite and math.isinf(x)) for x in found):
             many = "a finite number" if count == 1 else f"{count} finite numbers"
             raise self.refusal(part, shown, many)
         return found
