@@ -17,6 +17,10 @@ DEGREE = np.pi / 180
 def expanded(xml: XmlFile) -> XmlFile:
     """The file with what it includes, each element with the attributes of its default class."""
     _include(xml, xml.top, ())
+    first, *others = xml.top.findall("worldbody") or [Element("worldbody")]
+    for world in others:
+        first.extend(world)
+        xml.top.remove(world)
     whole = xml.again()
     for part in whole.top.iter():
         if part.tag in GENERATED:
