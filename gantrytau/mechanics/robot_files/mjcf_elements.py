@@ -88,13 +88,15 @@ class Orientation:
     @staticmethod
     def of(xml: XmlFile, settings: dict[str, str]) -> "Orientation":
         """What <compiler> says."""
-        angle = settings.get("angle", "degree")
+        angle, sequence = settings.get("angle", "degree"), settings.get("eulerseq", "xyz")
         part = xml.top.find("compiler")
         if part is not None:
             xml.known(part, "angle", angle, ("degree", "radian"), "unit")
             if settings.get("coordinate", "local") != "local":
                 raise xml.refusal(part, 'coordinate="global"', '"local"; MuJoCo has given up the other')
-        return Orientation(xml, 1.0 if angle == "radian" else DEGREE, settings.get("eulerseq", "xyz"))
+            if len(sequence) != 3 or not set(sequence.lower()) <= set("xyz"):
+                raise xml.refusal(part, f'eulerseq="{sequence}"', "three of x, y and z")
+        return Orientation(xml, 1.0 if angle == "radian" else DEGREE, sequence)
 
     def placement(self, part: Element) -> Placement:
         """Where an element stands in its body."""

@@ -143,7 +143,7 @@ class _Reader:
         if not parts:
             yield RobotJoint(f"{child}_mount", "fixed", parent, child, place)
         for k, one in enumerate(parts, 1):
-            end = child if k == len(parts) else f"{child}_{k}"
+            end = child if k == len(parts) else self._free(f"{child}_{k}")
             if end != child:
                 self.links.append(RobotLink(end))
             yield self._joint(one, parent, end, place)
@@ -155,8 +155,12 @@ class _Reader:
         word = "free" if part.tag == "freejoint" else part.get("type", "hinge")
         kind = KINDS[xml.known(part, "type", word, KINDS, "kind of joint")]
         if kind == "floating":
-            if parent != "world":
-                raise xml.refusal(part, f"a free joint of a body in '{parent}'", "one in <worldbody>")
+            if parent != "world" or child not in self.poses:
+                raise xml.refusal(
+                    part,
+                    f"a free joint, one of several or in '{parent}'",
+                    "the only one of a body of the world",
+                )
             return RobotJoint(name, kind, parent, child, place)
         anchor = Placement(xml.numbers(part, "pos", 3, NOWHERE))
         known = OF_BALLS if kind == "spherical" else OF_JOINTS
@@ -302,11 +306,13 @@ class _Reader:
 
     def _name(self, part: Element, otherwise: str) -> str:
         """The name of an element, or one that no other has."""
-        taken = {one.name for one in (*self.links, *self.joints, *self.loops)}
-        if part.get("name"):
-            return self.xml.word(part, "name")
-        others = (otherwise, *(f"{otherwise}_{k}" for k in range(2, len(taken) + 3)))
-        return next(name for name in others if name not in taken)
+        return self.xml.word(part, "name") if part.get("name") else self._free(otherwise)
+
+    def _free(self, name: str) -> str:
+        taken = {one.name for one in (*self.links, *self.joints, *self.loops)} | self.bodies
+        return next(
+            one for one in (name, *(f"{name}_{k}" for k in range(2, len(taken) + 3))) if one not in taken
+        )
 
 
 def _moved(kind: str, axis: tuple[float, ...], q: float) -> Placement:

@@ -36,7 +36,8 @@ class Geoms:
     def lumps(self, body: Element) -> Iterator[Lump]:
         """Those geoms of a body that have a mass."""
         xml = self.xml
-        low, high = map(float, self.settings.get("inertiagrouprange", "0 5").split())
+        words = self.settings.get("inertiagrouprange", "0 5")
+        low, high = xml.read_numbers(xml.top, words, 2, f'inertiagrouprange="{words}"')
         for part in body.iterfind("geom"):
             mass = None if part.get("mass") is None else xml.number(part, "mass")
             density = xml.number(part, "density", 1000.0)

@@ -136,7 +136,10 @@ PIN = '<worldbody><body name="a"><joint name="p"/><geom size=".1"/></body></worl
         (PIN + '<equality><weld body1="b"/></equality>', "equality/weld: found body1 'b', expected a body"),
         (PIN + '<equality><weld body1="a" body2="a"/></equality>', "found 'a' as both bodies"),
         (PIN + '<equality><joint joint1="p" joint2="p"/></equality>', "'p' which follows twice or itself"),
-        (PIN.replace("<geom", "<freejoint/><body><freejoint/></body><geom"), "free joint of a body in 'a'"),
+        (
+            PIN.replace("<geom", "<freejoint/><body><freejoint/></body><geom"),
+            "a free joint, one of several or in 'a'",
+        ),
         (PIN.replace("</body>", '<body name="a"/></body>'), "found two bodies or sites of the name 'a'"),
     ],
 )
