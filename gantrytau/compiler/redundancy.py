@@ -87,6 +87,7 @@ def without_redundant(
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
         _refuse_drives(flat, table, constraints, guess)
+        _refuse_starts(flat, constraints, guess)
         raise open_loops(flat, error, _nearest(constraints, guess)) from None
     if course:
         matrices = [_over_course(constraints, course)[-1]]
@@ -311,6 +312,25 @@ def _refuse_drives(
         return
     kept = _independent([_matrix(_jacobian(constraints, closed))], constraints.firm)
     _refuse_conflicts(flat, constraints, closed, kept)
+
+
+def _refuse_starts(flat: FlatModel, constraints: Constraints, guess: StartValues) -> None:
+    """StructureError where loops stay open because more starts are fixed than can move, seen where they close without."""
+    fixed = [n for n in constraints.moving if n in guess.fixed]
+    if not fixed:
+        return
+    try:
+        closed = _close(constraints, replace(guess, fixed=frozenset()), guess.values, flat.name)
+    except InitializationError:
+        return
+    _, sizes, right = np.linalg.svd(_matrix(_jacobian(constraints, closed)))
+    free = right[np.count_nonzero(sizes > RANK) :, [constraints.moving.index(n) for n in fixed]]
+    mobility = int(np.linalg.matrix_rank(free, tol=RANK)) if len(free) else 0
+    if mobility < len(fixed):
+        raise StructureError(
+            f"{flat.name}: found {len(fixed)} fixed starts, of {', '.join(fixed)}, where loops leave mobility {mobility} "
+            f"to these. Expected at most {mobility}, or values that agree: fix fewer, with Start(...) for the others"
+        )
 
 
 def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:

@@ -59,7 +59,7 @@ def translate_flat(
             raise
         try:
             settled = without_redundant(flat, table, frozenset(known))
-        except (InitializationError, StructureError):
+        except InitializationError:
             raise error from None
         if not settled.redundant:
             raise

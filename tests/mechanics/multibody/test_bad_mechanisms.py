@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gantrytau import (
+    Fixed,
     InitializationError,
     Model,
     ModelError,
@@ -26,6 +27,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.multibody import Fixed as Mount
+from gantrytau_models import FourBar
 from tests.mechanisms.rows import in_a_row, row
 
 
@@ -281,3 +283,11 @@ def test_a_loop_with_more_drives_than_mobility():
     apart = Overdriven(b=dict(s=Start(along + 0.1)), top=dict(phi=Start(2.0)), right=dict(phi=Start(-1.0)))
     with pytest.raises(StructureError, match=r"more is driven than can move: with the inputs a\.phi"):
         simulate(apart, stop=0.5)
+
+
+def test_a_loop_with_more_fixed_starts_than_mobility():
+    words = (
+        r"FourBar: found 2 fixed starts, of crank\.phi, rocker\.phi, where loops leave mobility 1 to these"
+    )
+    with pytest.raises(StructureError, match=words):
+        translate(FourBar(crank=dict(phi=Fixed(1.0)), rocker=dict(phi=Fixed(1.2))))
