@@ -1,6 +1,9 @@
 """`gantrytau simulate`: a model over time, its result as figures, files and pictures."""
 
-from typing import Any
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
 
 import gantrytau
 from gantrytau import Dae, DoubtfulResult, SolveError, flatten, translate
@@ -47,6 +50,12 @@ def simulate(
     display: Displayed = None,
     prototype: PrototypeName = None,
     set_: Settings = None,
+    statistics: Annotated[
+        bool,
+        typer.Option(
+            "--statistics", help="Also print steps, events by condition, seconds, and what limits the step."
+        ),
+    ] = False,
     json: Json = False,
     **policy: Any,
 ) -> None:
@@ -76,12 +85,15 @@ def simulate(
         states = [name for name in dae.states if name in result]
         shown = states or [name for name in result.names if name not in dae.parameter_values][:FEW]
         heading = "state" if states else "variable"
-        answered(
-            json,
-            record | result_output.record(result),
-            lambda: result_output.print_ends(chosen.name, result, shown, heading, units),
-            files,
-        )
+        work = result.statistics
+        record |= result_output.record(result) | ({"statistics": asdict(work)} if work else {})
+
+        def told_ends() -> None:
+            result_output.print_ends(chosen.name, result, shown, heading, units)
+            if statistics:
+                typer.echo(f"\n{work}")
+
+        answered(json, record, told_ends, files)
 
 
 def _translated(

@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from gantrytau.describing.described import Description
 from gantrytau.results.data_frames import data_frame
@@ -10,6 +10,7 @@ from gantrytau.results.described_result import series_described
 from gantrytau.results.display_units import DECLARED, Display, shown_units
 from gantrytau.results.figures import draw
 from gantrytau.results.files import dataset, save
+from gantrytau.results.run_statistics import RunStatistics
 from gantrytau.results.series import Series, Values
 
 if TYPE_CHECKING:
@@ -21,11 +22,25 @@ if TYPE_CHECKING:
 class Result(Series):
     """The variables of a model at the output times of a simulation or an optimum, see `Series`, with figures and files."""
 
+    _statistics: RunStatistics | None = None
+
     def __describe__(self, name: str = "") -> Description:
         return series_described(self, name)
 
     def _repr_html_(self) -> str:
         return self.__describe__().html()
+
+    @property
+    def statistics(self) -> RunStatistics | None:
+        """What the simulation took: steps, events by condition, seconds, and the states that limit its step; None if this is
+        no result of `simulate`, or one that was read from a file.
+        """
+        return None if self._statistics is None else self._statistics.of(self)
+
+    def with_statistics(self, found: RunStatistics) -> Self:
+        """This result with what its simulation took."""
+        self._statistics = found
+        return self
 
     def plot(
         self, *names: str, file: str | os.PathLike[str] | None = None, display: Display = None

@@ -7,6 +7,7 @@ import numpy as np
 from gantrytau.border.refusal import SolveError
 from gantrytau.interruption import on_interrupt
 from gantrytau.progress import Progress
+from gantrytau.results.run_statistics import BESIDE, RunStatistics
 from gantrytau.simulation import simulation_errors as run_ends
 from gantrytau.simulation.between.across import across, lay, left_at
 from gantrytau.simulation.between.narrow_forces import NarrowForces
@@ -51,9 +52,13 @@ class Run:
         tolerance: float,
         longest: float | None = None,
         crosses: bool = False,
+        work: RunStatistics | None = None,
     ):
-        """tolerance: of one step; longest: step of the integrator, s; crosses: whether it crosses singular poses."""
+        """tolerance: of one step; longest: step of the integrator, s; crosses: whether it crosses singular poses; work:
+        what it takes, counted.
+        """
         self.coordinates = coordinates
+        self.work = work or RunStatistics()
         begin, end = float(grid[0]), float(grid[-1])
         self.span = end - begin
         if coordinates.pieces.switched.smooth:  # whose pieces nothing keeps a long step from jumping over
@@ -69,14 +74,14 @@ class Run:
         own = OFTEN if often else SMOOTHLY * small if smooth else SOMETIMES
         exact = max(own * tolerance, min(LEAST, tolerance))
         self.enough = tolerance if smooth else exact  # where rounding keeps the integrator from more
-        self.integrators = Integrators(coordinates, exact, longest, interval)
+        self.integrators = Integrators(coordinates, exact, longest, interval, self.work)
         self.crosses, self.crossed = crosses, list[float]()  # times, s
         self.integrators.most = WALKED_STEPS if crosses else MOST_STEPS  # soon given up before a pose
         self.done = 0
         self.seen = -1  # the last interval that was looked at closely
         self.changes = Changes(coordinates, self.trail, self.integrators.sizes, self.span)
         self.looks = Looks(coordinates, self.trail)
-        sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest)
+        sampler = Sampler(coordinates, tolerance, self.integrators.sizes, longest, self.work)
         self.history = PastValues(coordinates, self.trail, tolerance) if coordinates.dae.flat.delays else None
         self.sampler = sampler if sampler.suits else None
 
@@ -95,6 +100,19 @@ class Run:
         places = np.flatnonzero(due | trail.kept[so_far])
         return trail.t[places], trail.rows(places)
 
+    def count_events(self) -> None:
+        """Add to the statistics how often each condition turned so far, and each when acted."""
+        whens, own = self.coordinates.rounds.whens, self.coordinates.rounds.of
+        asked = {k for conditions in own for k in conditions}
+        size = len(self.coordinates.switches)
+        modes = self.trail.held[: self.done + 1, self.trail.held.shape[1] - size :]
+        turns = np.count_nonzero(np.diff(modes, axis=0), axis=0).tolist()
+        for k in range(size):
+            if turns[k] and k not in asked:
+                self.work.count(self.changes.conditions(np.array([k]))[0], turns[k])
+        for when, acts in zip(whens, self.changes.acts.tolist(), strict=True):
+            self.work.count(when.label, acts)
+
     @property
     def ended(self) -> str:
         """Why it ended: "stop", or what a when said."""
@@ -108,6 +126,7 @@ class Run:
         with (
             Progress("simulate", trail.t[0], trail.t[-1]) as progress,
             on_interrupt(self.integrators.interrupt),
+            self.work.spent_on(BESIDE),
         ):
             size = most = self._longest()
             while self.done < trail.last and not self.changes.ended:

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.kernels import Kernel
+from gantrytau.results.run_statistics import BESIDE, INTEGRATION, MAKING, RunStatistics
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.full_coordinates import FUNCTIONS, Coordinates
 from gantrytau.simulation.memory.hermite import ORDER, shifted
@@ -27,10 +28,17 @@ class Integrators:
     """Integrators over some numbers of intervals, made when they are needed.
 
     size: of algebraics, below which their errors do not count; by_modes: whether each choice of modes has its own;
-    most: steps to one end.
+    most: steps to one end; work: what they take, counted.
     """
 
-    def __init__(self, coordinates: Coordinates, tolerance: float, longest: float | None, interval: float):
+    def __init__(
+        self,
+        coordinates: Coordinates,
+        tolerance: float,
+        longest: float | None,
+        interval: float,
+        work: RunStatistics,
+    ):
         """longest: step anywhere, s; interval: the longest between two places, s."""
         self.coordinates, self.tolerance = coordinates, max(tolerance, FINEST)
         self.sizes = np.array(coordinates.sizes or [1.0] * len(coordinates.states))
@@ -38,6 +46,7 @@ class Integrators:
         self.longest, self.interval = longest, interval
         self.shorter: float | None = None  # step, while a function of time changes after it was at rest, s
         self.size, self.by_modes = 1.0, False
+        self.work = work
         self.most, self.steps = MOST_STEPS, 0  # steps: that `over` took
 
     def over(
@@ -118,7 +127,12 @@ class Integrators:
     def _count(self, integrator: ca.Function, kernels: dict[str, Kernel]) -> None:
         """Note the steps of an integrator, and how often it called its functions."""
         stats = integrator.stats(1)  # of the memory that `AtPlaces` has
-        self.steps = int(stats["nsteps"])
+        self.steps, work = int(stats["nsteps"]), self.work
+        work.steps += self.steps
+        work.rejected += int(stats["netfails"]) + int(stats["nncfails"])
+        work.evaluations += int(stats["nfevals"])
+        work.jacobians += int(stats["nlinsetups"])
+        work.restarts += 1
         for name in FUNCTIONS:
             if name not in kernels:
                 kernels[name] = Kernel(integrator.get_function(name))
@@ -137,23 +151,25 @@ class Integrators:
         kernels = kept(("kernels of integrators", modes, sizes), dict[str, Kernel])
         functions = {name: own.function for name, own in kernels.items()}
         there = tuple(name for name, own in kernels.items() if own.there)
-        integrator = kept(
-            ("integrator", count, most, modes, longest, size, tolerance, sizes, there),
-            lambda: AtPlaces(
-                self.coordinates.integrator(
-                    count,
-                    tolerance,
-                    size=size,
-                    steps=most,
-                    modes=modes,
-                    longest=longest,
-                    functions=functions,
-                )
-            ),
-        )
+        with self.work.spent_on(MAKING, BESIDE):
+            integrator = kept(
+                ("integrator", count, most, modes, longest, size, tolerance, sizes, there),
+                lambda: AtPlaces(
+                    self.coordinates.integrator(
+                        count,
+                        tolerance,
+                        size=size,
+                        steps=most,
+                        modes=modes,
+                        longest=longest,
+                        functions=functions,
+                    )
+                ),
+            )
         start = (x / self.sizes)[None] if x.size else np.zeros((1, 1))
         given = start, z[None], np.reshape(p, (1, -1)), np.reshape(u, (1, -1), order="F")
-        with contextlib.redirect_stderr(io.StringIO()), self._at_work():
+        spent = self.work.spent_on(INTEGRATION, BESIDE)
+        with contextlib.redirect_stderr(io.StringIO()), self._at_work(), spent:
             far, forces, *_ = integrator(
                 *given, *(0.0 for _ in range(integrator.function.n_in() - len(given)))
             )

@@ -22,6 +22,7 @@ from gantrytau.inputs.input_signal import check_seed
 from gantrytau.language.model import Model
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.result import Result
+from gantrytau.results.run_statistics import MAKING, VARIABLES, RunStatistics
 from gantrytau.simulation.between.passed_limits import passed, stopping
 from gantrytau.simulation.events.sticking import with_sticking
 from gantrytau.simulation.full_coordinates import Coordinates
@@ -75,7 +76,7 @@ def simulate(
     limits: "warn" reports the first passing of a variable's `min` or `max` with its time (DoubtfulResult), "stop" ends the
     run there as `terminate` does, None does not look.
     singular: "stop" at a pose with undetermined forces, or "cross" it with the speeds before it and a warning.
-    `.ended` of the result is the text of the `terminate` that ended the run.
+    The result's `.ended` is the text of the `terminate` that ended it; `.statistics` has steps, events, seconds.
     Raises SolveError with `.time` and the partial `.result` when the integration stops, InitializationError without a
     consistent start, ModelError for wrong names and values. Warns (DoubtfulResult) of variables that are not finite
     although the states are, and of passed limits.
@@ -147,20 +148,24 @@ def _all_runs(
     far where it stops before its end.
     """
     parts: list[Result] = []
+    work = RunStatistics()
     crossed: list[float] = []
     left = grid
     while True:
-        run, error = _sized_run(
-            _coordinates(dae, signals, wanted), signals, left, tolerance, max_step, crosses
-        )
+        with work.spent_on(MAKING):
+            coordinates = _coordinates(dae, signals, wanted)
+        run, error = _sized_run(coordinates, signals, left, tolerance, max_step, crosses, work)
+        run.count_events()
         crossed += run.crossed
         ended = run.ended if error is None else str(error) or "interrupted"
-        parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended, run.instants()))
+        with work.spent_on(VARIABLES):
+            parts.append(result_of(run.coordinates, *run.so_far(), outputs, ended, run.instants()))
         found = other_constraints(run) if isinstance(error, SolveError) and not dae.flat.delays else None
         if found is None:
             break
         left, dae = found
-    result = joined(parts, grid)
+    work.sizes = dict(zip(run.coordinates.states, run.integrators.sizes.tolist(), strict=True))
+    result = joined(parts, grid).with_statistics(work)
     if crossed:
         times = ", ".join(f"{t:.6g}" for t in crossed)
         warnings.warn(
@@ -196,12 +201,13 @@ def _sized_run(
     tolerance: float,
     max_step: float | None,
     crosses: bool,
+    work: RunStatistics,
 ) -> tuple[Run, SolveError | KeyboardInterrupt | None]:
     """A run by sizes of the states that it shows itself, and why it stopped before its end, if it did."""
     coordinates = coordinates.sized(first_sizes(coordinates))
     left = ROUNDS
     while True:
-        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step, crosses)
+        run = Run(coordinates, signals, grid, MARGIN * tolerance, max_step, crosses, work)
         try:
             run.go()
         except (SolveError, KeyboardInterrupt) as error:

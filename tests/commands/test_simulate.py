@@ -41,8 +41,10 @@ def test_a_pushed_cart_goes_as_far_as_newton_says(run, answer, robots):
     assert found["time"] == {"start": 1.0, "stop": 5.0, "points": 9}
     assert found["states"] == ["x", "v"]
     assert found["files"] == []
-    spoken = run(*arguments)
+    spoken = run(*arguments, "--statistics")
     assert spoken.exit_code == 0
+    assert found["statistics"]["steps"] > 5
+    assert "rejected" in spoken.stdout
     assert "Cart: 1 s to 5 s, 501 points" in spoken.stdout
     assert [line.split()[:3] for line in spoken.stdout.splitlines() if line.strip().startswith("x ")] == [
         ["x", "0", "12"]

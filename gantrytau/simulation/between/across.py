@@ -47,7 +47,9 @@ def _part(found: Approach) -> float:
 def across(found: Approach, begin: Point, integrators: Integrators) -> tuple[Across, Point] | None:
     """Polynomial across a pose from a point before it, and the point behind the pose; None if the motion does not go on."""
     c, part, points = integrators.coordinates, _part(found), [begin]
-    fine = Integrators(c, FINER * integrators.tolerance, integrators.longest, integrators.interval)
+    fine = Integrators(
+        c, FINER * integrators.tolerance, integrators.longest, integrators.interval, integrators.work
+    )
     try:
         for count in (3, 2, 1):
             points.append(fine.step(points[-1], found.zero - count * part - points[-1][2]))

@@ -50,7 +50,7 @@ class Changes:
         self._timed = np.array([all(timed[k] for k in conditions) for conditions in coordinates.rounds.of])
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
-        self._hops = np.zeros(self._holding.size, dtype=int)
+        self._hops, self.acts = np.zeros((2, self._holding.size), dtype=int)  # acts: of each when, counted
         self._acted: dict[int, tuple[float, np.ndarray]] = {}  # when: last time, rates of margins behind it
         self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
 
@@ -192,6 +192,7 @@ class Changes:
                 waits = self.coordinates.slips.postponed(rose, self.point(k))
                 rose, self._holding = rose & ~waits, now & ~waits
             made = rounds.made(self.point(k), rose)
+            self.acts += made.acts != 0
             acting = [rounds.whens[i] for i in np.flatnonzero(made.acts)]
             for one in acting:
                 if one.failure:

@@ -7,11 +7,12 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import SolveError
+from gantrytau.results.run_statistics import BESIDE, INTEGRATION, RunStatistics
 from gantrytau.simulation.events.crossings import first_crossing
 from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.buffers import Passages, StepsTaken
-from gantrytau.simulation.sampling.runge_kutta import ORDER
+from gantrytau.simulation.sampling.runge_kutta import ORDER, STAGES
 from gantrytau.simulation.sampling.sampling_interval import linear
 from gantrytau.simulation.time_grid import Trail
 
@@ -27,11 +28,19 @@ LONGEST_WAIT = 1000  # stretches of the integrator
 class Sampler:
     """Goes along a trail in explicit steps.
 
-    tolerance: of one step, relative, and absolute in units of sizes (n,) of the states; longest: step, s.
+    tolerance: of one step, relative, and absolute in units of sizes (n,) of the states; longest: step, s; work: what the
+    steps take, counted.
     """
 
-    def __init__(self, coordinates: Coordinates, tolerance: float, sizes: np.ndarray, longest: float | None):
-        self.coordinates, self.tolerance, self.sizes = coordinates, tolerance, sizes
+    def __init__(
+        self,
+        coordinates: Coordinates,
+        tolerance: float,
+        sizes: np.ndarray,
+        longest: float | None,
+        work: RunStatistics,
+    ):
+        self.coordinates, self.tolerance, self.sizes, self.work = coordinates, tolerance, sizes, work
         self.longest = np.inf if longest is None else longest
         self.step = np.inf  # s, that the last errors allow
         self.most = FIRST  # passages in the next call
@@ -127,13 +136,18 @@ class Sampler:
         places = np.arange(here, here + count + 1)
         told = self._told(trail, places, parts)
         first = np.concatenate([trail.x[here], trail.held[here]])
-        found = self.passages.steps(first, told, size, (trail.last - here) * len(told) / count)
+        with self.work.spent_on(INTEGRATION, BESIDE):
+            found = self.passages.steps(first, told, size, (trail.last - here) * len(told) / count)
         error = self._error(found, told[:, 1])
         good = int(np.argmax(error > 1)) if np.any(error > 1) else error.size
         self._adapt(error[: good + 1], told[:, 1])
         accepted = int(np.searchsorted(ends, good, side="right"))
+        self.work.rejected += int(good < error.size)
         turn = self._first_turn(found, told, int(ends[accepted - 1]) if accepted else 0)
         reached = accepted if turn is None else int(np.searchsorted(ends, turn, side="right"))
+        steps = int(ends[reached - 1]) if reached else 0
+        self.work.steps += steps
+        self.work.evaluations += len(STAGES) * (steps + int(good < error.size))
         n, rows, filled = self.sizes.size, ends[:reached] - 1, places[1 : reached + 1]
         trail.x[filled], trail.held[filled] = found.after[rows, :n], found.after[rows, n:]
         trail.z[filled] = found.algebraics[rows]
