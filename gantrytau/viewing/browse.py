@@ -46,7 +46,7 @@ def browse(
     """Results of `simulate`, or optima, as one page for any browser: variables by component, curves, cursors, bands.
 
     file: where the page is saved, too; names: variables and components that it holds, ("tool.r", "carts[0]"), all if none;
-    first: variables that are drawn when it opens; titles: of the results, where several are shown over each other; display:
+    first: variables that are drawn when it opens; titles: of the results; display:
     units as of `Result.plot`; model: whose motion it is, of results that were read from a file; scene: whether the model
     is drawn beside, where it has shapes, at the time of the cursor. The page needs no network. Raises ModelError for what is
     no result, for unknown names, and for more than 400 MB of numbers.
@@ -63,7 +63,8 @@ def browse(
             )
     named = _titles(titles, [run.title or "run" for run in runs])
     kept, begun = (_names(argument, chosen) for argument, chosen in (("names", names), ("first", first)))
-    title = ", ".join(dict.fromkeys(run.title for run in runs if run.title)) or "Results"
+    own = named if titles is not None else [run.title for run in runs]
+    title = ", ".join(dict.fromkeys(filter(None, own))) or "Results"
     drawn, told = _scene(results, runs, named, model) if scene else ("", None)
     blocks = packed(runs, named, kept, begun, display, told)
     made = Page(assembled(title, "page.html", blocks, drawn, STYLES, SCRIPTS), title)

@@ -1,5 +1,6 @@
 """What is shown: the values of a result at the instants of the pictures."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -158,6 +159,9 @@ def series_of(verb: str, shown: Any) -> Result:
     series = (
         shown if isinstance(shown, Series) else moved() if callable(moved) else getattr(shown, "result", None)
     )
+    if isinstance(shown, (str, os.PathLike)):
+        words = f"{verb}: found the file {shown}, expected what simulate or optimize returned; the command `gantrytau "
+        raise ModelError(f"{words}browse {shown}` shows a saved result")
     if not isinstance(series, Result):
         raise ModelError(
             f"{verb}: found {type(shown).__name__}, expected what simulate or optimize returned; view(model) shows a pose"

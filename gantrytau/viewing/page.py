@@ -17,6 +17,19 @@ from gantrytau.viewing.solids import COLOURS, Solid, extent, solids
 from gantrytau.whole_files import replacing
 
 SIDES = 24  # of a cone
+OTHERS = (
+    ".pdf",
+    ".png",
+    ".svg",
+    ".jpg",
+    ".jpeg",
+    ".gif",
+    ".mp4",
+    ".webm",
+    ".csv",
+    ".nc",
+    ".json",
+)  # files that no page is
 AMBIENT = 2.0  # of the light that comes from everywhere, beside that which casts shadows
 PARTS = ("bar", "ball", "body", "drive", "ground")  # what turns red at a limit
 VIEW = np.array([0.42, -0.62, 0.3])  # of the camera from the middle, in sizes of what is seen
@@ -34,6 +47,9 @@ class Page:
         """Write it to a file and return its path."""
         if Path(path).is_dir():
             raise ModelError(f"{path}: found a folder, expected the name of a file in it, such as robot.html")
+        if Path(path).suffix.lower() in OTHERS:
+            words = f"{path}: found the suffix of another kind of file, expected .html; buttons of the page save pictures"
+            raise ModelError(words, argument="file")
         with replacing(path) as file:
             file.write_text(self.text, encoding="utf-8")
         return Path(path)

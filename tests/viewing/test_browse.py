@@ -144,3 +144,15 @@ def test_a_title_is_no_markup_and_nothing_is_fetched():
     text = browse(run(title="<b>&")).text
     assert "<title>&lt;b&gt;&amp;</title>" in text
     assert re.findall(r"<(?:script|link|img|iframe)[^>]*?(?:src|href)=", text) == []
+
+
+def test_files_of_other_kinds_are_told_and_one_result_has_its_title(tmp_path):
+    with pytest.raises(
+        ModelError, match=r"x\.pdf: found the suffix of another kind of file, expected \.html"
+    ):
+        browse(run(), file=tmp_path / "x.pdf")
+    with pytest.raises(
+        ModelError, match=r"found the file fall\.nc, .*`gantrytau browse fall\.nc` shows a saved"
+    ):
+        browse("fall.nc")
+    assert "<h1>first run</h1>" in browse(run(), titles=["first run"]).text

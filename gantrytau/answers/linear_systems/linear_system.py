@@ -203,6 +203,9 @@ class LinearSystem(Record):
         ModelError for systems and spectra of another shape.
         """
         systems = bode_and_poles.beside_each_other(self, "plot_bode", beside, spectra=True)
+        if frequencies is not None and not np.any(self._hertz(frequencies) > 0):
+            words = "expected some above 0 Hz, which has no place on the axis"
+            raise ModelError(words, place=f"{self.title}.plot_bode", found=Given("frequencies", frequencies))
         return bode_and_poles.draw_bode(
             self, bode_and_poles.curves_of(systems, frequencies), file, dB, rad_per_s
         )

@@ -20,10 +20,10 @@ class Margins(Record):
     stable: of the closed loop; if False, the margins tell what separates it from stability. gain: the next factors of L
     below and above 1 at which the closed loop is on the edge of stability, 0 and inf where there are none, with
     gain_frequencies. phase: deg, the smallest of all gain crossings, with phase_frequency. delay: s that the closed loop
-    bears. disk: size alpha of the balanced disk, 1 / max |(S - T) / 2|, so that gain (2 - alpha) / (2 + alpha) to its
-    inverse and phase 2 atan(alpha / 2) may change together (Seiler, Packard, Gahinet, An introduction to disk margins,
-    2020). M_s, M_t: peaks of |S| and |T| with their frequencies. bandwidth: where |T| first falls below |T(0)| / sqrt(2),
-    inf if never, nan for T(0) = 0.
+    bears, 0 if it is unstable. disk: size alpha of the balanced disk, 1 / max |(S - T) / 2|, so that gain (2 - alpha) /
+    (2 + alpha) to its inverse and phase 2 atan(alpha / 2) may change together (Seiler, Packard, Gahinet, An introduction
+    to disk margins, 2020). M_s, M_t: peaks of |S| and |T| with their frequencies. bandwidth: where |T| first falls below
+    |T(0)| / sqrt(2), inf if never, nan for T(0) = 0.
     """
 
     stable: bool
@@ -64,7 +64,7 @@ def margins_of(loop: SisoSystem) -> Margins:
     ]
     (M_s, at_s), (M_t, at_t), (skew, _) = peaks
     return Margins(
-        closed.stable, (low[0], high[0]), (low[1], high[1]), phase, at, delay,
+        closed.stable, (low[0], high[0]), (low[1], high[1]), phase, at, delay if closed.stable else 0.0,
         1 / skew, M_s, at_s, M_t, at_t, _bandwidth(loop, hertz),
     )  # fmt: skip
 

@@ -9,6 +9,9 @@ const Curves = (() => {
   const self = {isDark: () => dark.matches, onTheme: (call) => dark.addEventListener("change", call)};
 
   self.colour = (k, light = !dark.matches) => (light ? LIGHT : DARK)[k % LIGHT.length];
+  // of a mode by its number, each another one
+  self.band = (value, light = !dark.matches) =>
+    `hsl(${((207 + 137.508 * (value < 0 ? 0.5 - value : value)) % 360).toFixed(1)}, 60%, ${light ? 42 : 68}%)`;
   self.dash = (k) => DASHES[k % DASHES.length];
 
   const steps = (curve) => curve.variable.held || curve.variable.modes;

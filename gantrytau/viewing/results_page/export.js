@@ -62,7 +62,7 @@ const Export = (() => {
     for (const v of Curves.ticks(...y, height / 35)) parts.push(line(LEFT, Y(v), LEFT + width, Y(v), 'stroke="#ddd"'), text(LEFT - 6, Y(v) + 4, short(v, y), 'text-anchor="end"'));
     const id = `clip${parts.length}`, shade = Panels.shading(one);
     for (const [begin, end, value] of shade ? Curves.stretches(shade, ...x) : [])
-      if (value) parts.push(`<rect x="${X(Math.max(begin, x[0]))}" y="${top}" width="${X(Math.min(end, x[1])) - X(Math.max(begin, x[0]))}" height="${height}" fill="${Curves.colour(Math.abs(value) + 1, true)}" fill-opacity="0.13"/>`);
+      if (value) parts.push(`<rect x="${X(Math.max(begin, x[0]))}" y="${top}" width="${X(Math.min(end, x[1])) - X(Math.max(begin, x[0]))}" height="${height}" fill="${Curves.band(value, true)}" fill-opacity="0.13"/>`);
     parts.push(`<clipPath id="${id}"><rect x="${LEFT}" y="${top}" width="${width}" height="${height}"/></clipPath><g clip-path="url(#${id})">`);
     for (const curve of shown) parts.push(path(curve, x, X, Y));
     parts.push(`</g><rect x="${LEFT}" y="${top}" width="${width}" height="${height}" fill="none" stroke="#888"/>`);
@@ -76,7 +76,7 @@ const Export = (() => {
     parts.push(text(LEFT, top + 12, curve.variable.name + run));
     for (const [begin, end, value] of Curves.stretches(curve, low, high)) {
       const word = Curves.word(curve.variable, value), size = X(end) - X(begin);
-      parts.push(`<rect x="${X(begin)}" y="${top + 16}" width="${size}" height="16" fill="${Curves.colour(Math.abs(value) + 1, true)}" fill-opacity="${value === 0 ? 0.12 : 0.45}"/>`);
+      parts.push(`<rect x="${X(begin)}" y="${top + 16}" width="${size}" height="16" fill="${Curves.band(value, true)}" fill-opacity="${value === 0 ? 0.12 : 0.45}"/>`);
       if (size > 7 * word.length + 6) parts.push(text(X(begin) + 4, top + 28, word));
     }
     return top + 16 + BAND;

@@ -86,7 +86,7 @@ const Legend = (() => {
     for (const [begin, end, value] of Curves.stretches(curve, low, high)) {
       const from = Math.max(X(begin), 0), to = Math.min(X(end), width), word = Curves.word(band.variable, value);
       ctx.globalAlpha = value === 0 ? 0.12 : 0.45;
-      ctx.fillStyle = Curves.colour(Math.abs(value) + 1);
+      ctx.fillStyle = Curves.band(value);
       ctx.fillRect(from, 0, Math.max(to - from, 1), height);
       ctx.globalAlpha = 1;
       ctx.fillStyle = getComputedStyle(canvas).color;

@@ -195,7 +195,7 @@ const Panels = (() => {
     for (const [begin, end, value] of Curves.stretches(curve, low, high)) {
       if (value === 0) continue;
       const from = Math.max(u.valToPos(begin, "x", true), left), to = Math.min(u.valToPos(end, "x", true), left + width);
-      ctx.fillStyle = Curves.colour(Math.abs(value) + 1);
+      ctx.fillStyle = Curves.band(value);
       ctx.fillRect(from, top, to - from, height);
     }
     ctx.restore();

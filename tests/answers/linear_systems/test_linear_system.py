@@ -240,6 +240,7 @@ TWO_INPUTS = StateSpace(2, [[1.0, 2.0]], 1)
         (lambda: StateSpace(np.eye(2), [1, 0], [1, 0], [[1.0, 2.0]]), "D"),
         (lambda: ONE.discrete(-1.0), "period"),
         (lambda: ONE.response([-1.0]), "frequencies"),
+        (lambda: ONE.plot_bode([0.0]), "frequencies"),
         (lambda: EACH_SECOND.response([0.6]), "frequencies"),
         (lambda: EACH_SECOND.simulate(np.ones((4, 2))), "u"),
         (lambda: EACH_SECOND.simulate([1.0], x=[1, 2]), "x"),

@@ -85,6 +85,7 @@ def test_a_sampled_loop_is_on_its_edge_at_half_of_the_sampling_frequency():
     found = StateSpace(1, 0.1, 1, period=0.1).margins()  # 0.1 k / (z - 1): stable for k below 20
     assert found.gain == (0.0, pytest.approx(20.0))
     assert found.gain_frequencies[1] == pytest.approx(5.0)
+    assert StateSpace(1, 0.1, 30, period=0.1).margins().delay == 0  # unstable already
 
 
 def test_one_loop_of_several_is_named_and_hidden_modes_do_not_count():
