@@ -173,16 +173,18 @@ class _Plan:
                 return Universal(n_a=axis, n_b=list(joint.axis_b), **seen)
         coordinate, speed, force = LETTERS[joint.kind == "prismatic"]
         values: dict[str, Any] = {coordinate: {}, speed: _both(joint.velocity), force: _both(joint.effort)}
-        start = joint.start
+        closed = bool(self.robot.loops) or self.robot.closed
+        # loops start as they are written, unless somebody says where
+        written = closed and not any(one.chosen for one in self.robot.joints)
+        start = 0.0 if written and joint.start is None else joint.start
         if joint.limits is not None:
             low, high = joint.limits
             values[coordinate] = dict(min=low, max=high)
             start = min(max(0.0, low), high) or None if start is None else start
-        closed = bool(self.robot.loops) or self.robot.closed
         if start is not None:
             values[coordinate]["start"] = start
             # where a loop starts is said by what drives it, the rest follows
-            values[coordinate]["fixed"] = closed and joint.name in self.driven
+            values[coordinate]["fixed"] = closed and joint.chosen and joint.name in self.driven
         if closed and joint.name not in self.driven:
             for one in (coordinate, speed):
                 values[one]["prefer"] = StateSelect.DEFAULT

@@ -102,7 +102,7 @@ class RobotJoint:
     placement: of the joint in the parent link; seat: of the child link in the joint; axis: in the joint, of a universal
     joint the first one, axis_b its second; limits: of the coordinate, m or rad; effort, velocity: N or N.m, m/s or rad/s;
     damping, friction: viscous and Coulomb; armature: kg or kg.m2 of the drive; stiffness, rest: of a spring, N/m or
-    N.m/rad, and the coordinate at which it is slack; start: of the coordinate.
+    N.m/rad, and the coordinate at which it is slack; start: of the coordinate; chosen: whether somebody asks for this start.
     """
 
     name: str
@@ -123,6 +123,7 @@ class RobotJoint:
     rest: float = 0.0
     mimic: Coupling | None = None
     start: float | None = None
+    chosen: bool = False
 
     @property
     def moves(self) -> bool:
@@ -184,6 +185,9 @@ class RobotDescription:
         self, loops: Iterable[LoopJoint], driven: tuple[str, ...] | None, start: Mapping[str, float]
     ) -> "RobotDescription":
         """The same with further loops, other driven joints and other starts."""
-        joints = tuple(replace(one, start=start.get(one.name, one.start)) for one in self.joints)
+        joints = tuple(
+            replace(one, start=start[one.name], chosen=True) if one.name in start else one
+            for one in self.joints
+        )
         driven = self.driven if driven is None else driven
         return replace(self, joints=joints, loops=(*self.loops, *loops), driven=driven)

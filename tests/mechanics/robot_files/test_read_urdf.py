@@ -78,6 +78,22 @@ def test_the_planar_loop_closes_by_any_joint_that_lets_it_turn(kind):
     )
 
 
+@pytest.mark.parametrize("kind", ["revolute", "spherical"])
+def test_a_parallelogram_that_is_mounted_by_half_turns_starts_as_it_is_written(tmp_path, kind):
+    def pivot(name, parent, child, x, pitch):
+        where = f'<origin xyz="{x} 0 0" rpy="{HALF_TURN!r} {pitch} {HALF_TURN!r}"/><axis xyz="0 -1 0"/>'
+        return joint(name, "continuous", parent, child, where)
+
+    body = '<link name="base"/>' + link("left") + link("top") + link("right")
+    body += pivot("p", "base", "left", 0, 1.2) + pivot("q", "left", "top", 0.4, -1.2)
+    body += pivot("u", "base", "right", 1, 1.2) + f'<constraint name="k" type="{kind}"><parent link="right"/>'
+    body += '<parent_origin xyz="0.4 0 0"/><parent_axis xyz="0 -1 0"/><child link="top"/><child_origin xyz="1 0 0"/>'
+    dae = translate(read(tmp_path, body + "</constraint>", loops={"driven": ["p"]})())
+    found = dae.evaluate({})
+    assert [found[f"{name}.phi"] for name in "pqu"] == pytest.approx([0, 0, 0], abs=1e-12)
+    assert dae.diagnosis.mobility == 1
+
+
 @pytest.mark.parametrize(
     "rpy", [(0, 0, 0), (0, HALF_TURN / 2, 0), (HALF_TURN, 0, HALF_TURN), (0.3, -1.2, 2.8)]
 )
