@@ -161,6 +161,21 @@ def test_masses_by_collisions_gravity_of_the_world_and_static_models(tmp_path):
     assert told.startswith("sdf/model[robot]/link[a]: without <inertial>, so 1 kg")
 
 
+def test_meshes_of_packages_have_their_mass(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    corners = "v 0 0 0\nv 0.3 0 0\nv 0 0.2 0\nv 0 0 0.4\n"
+    (tmp_path / "meshes" / "wedge.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    mesh = "<geometry><mesh><uri>model://parts/wedge.obj</uri><scale>1 1 2</scale></mesh></geometry>"
+    file = written(
+        tmp_path, f"<link name='a'><inertial auto='true'/><collision name='c'>{mesh}</collision></link>"
+    )
+    values = translate(read_sdf(file, packages={"parts": tmp_path / "meshes"})()).parameter_values
+    assert values["a.m"] == pytest.approx(1000 * 0.3 * 0.2 * 0.8 / 6)
+    assert values["a.r_cm[2]"] == pytest.approx(0.2)
+    with pytest.raises(ModelError, match="the mesh model://parts/wedge.obj without a file"):
+        read_sdf(file)
+
+
 PAIR = link("a") + link("b")
 
 
