@@ -172,7 +172,7 @@ def test_meshes_of_packages_have_their_mass(tmp_path):
     values = translate(read_sdf(file, packages={"parts": tmp_path / "meshes"})()).parameter_values
     assert values["a.m"] == pytest.approx(1000 * 0.3 * 0.2 * 0.8 / 6)
     assert values["a.r_cm[2]"] == pytest.approx(0.2)
-    with pytest.raises(ModelError, match="the mesh model://parts/wedge.obj without a file"):
+    with pytest.raises(ModelError, match=r"the mesh model://parts/wedge\.obj without a file"):
         read_sdf(file)
 
 
