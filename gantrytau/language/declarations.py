@@ -261,6 +261,7 @@ class Parameter(Quantity):
     """
 
     kind = "parameter"
+    free = False  # whether an optimiser chooses it
 
     def __init__(
         self,

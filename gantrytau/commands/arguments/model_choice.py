@@ -4,7 +4,7 @@ import importlib
 import inspect
 import typing
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from gantrytau import (
     Connector,
     Model,
     ModelError,
+    ModelicaLibrary,
     check_member,
     load_modelica,
     parameters_of,
@@ -26,6 +27,7 @@ from gantrytau.commands.printing.reporting import CommandError, note, refusing
 from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
+TEXT = (".mo", ".mop")  # files of Modelica and of Optimica
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     wanted = _wanted(choice, text, robot)
     if choice.file and choice.file.suffix.lower() == ".urdf":
         found = _in_urdf(choice.file, kind)
-    elif choice.file and choice.file.suffix == ".mo":
+    elif choice.file and choice.file.suffix in TEXT:
         found = _in_text(choice.file, choice.name, kind)
     else:
         found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
@@ -233,15 +235,24 @@ def _in_urdf(file: Path, kind: Kind) -> type[Model]:
 
 
 def _in_text(file: Path, name: str, kind: Kind) -> Any:
-    """The class of a Modelica file; without a name, the only model in it."""
-    library = load_modelica(file)
-    models = [one for one in library.names if library.kind_of(one) in ("model", "block")]
+    """The class of a file of Modelica or Optimica; without a name, the only one in it of the kind."""
+    library = _text_loader(file)(file)
+    wanted = ("optimization",) if kind is PROBLEM else ("model", "block")
+    models = [one for one in library.names if library.kind_of(one) in wanted]
     if not name and len(models) != 1:
-        what = f"several models ({', '.join(models)})" if models else "no model"
+        what = f"several {kind.word}s ({', '.join(models)})" if models else f"no {kind.word}"
         raise CommandError(
-            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), 'Model')}"
+            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), kind.word.title())}"
         )
     return _checked(library[name or models[0]], f"{file.name}:{name}", kind)
+
+
+def _text_loader(file: Path) -> Callable[..., ModelicaLibrary]:
+    if file.suffix == ".mo":
+        return load_modelica
+    from gantrytau_optimica import load_optimica  # which is not needed by most commands
+
+    return load_optimica
 
 
 def _checked(found: Any, name: str, kind: Kind) -> Any:

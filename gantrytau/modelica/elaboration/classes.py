@@ -21,23 +21,20 @@ from gantrytau.modelica.elaboration.statements import (
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
 
-CLASSES = ("model", "block", "connector", "record", "class")
-TAKEN = {
-    "equations",
-    "initial_equations",
-    "members",
-    "modified",
-    "modifications",
-    "chosen_starts",
-    "shaped",
-    "structure",
-}
-
 
 class TextClass(Declared):
-    """What classes of Modelica text have in common. structure: of an instance without modifications."""
+    """What classes of Modelica text have in common.
+
+    structure: of an instance without modifications; _kinds: the restricted classes of which it is made; _taken: names that
+    no component may have.
+    """
 
     structure: ClassVar[Structure]
+    _kinds: ClassVar[frozenset[str]] = frozenset({"model", "block", "connector", "record", "class"})
+    _taken: ClassVar[frozenset[str]] = frozenset(
+        {"equations", "initial_equations", "members", "modified"}
+        | {"modifications", "chosen_starts", "shaped", "structure"}
+    )
     first_index = 1
     checks_units = False
 
@@ -103,7 +100,8 @@ def _known(one: ClassMember) -> Any:
 def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     """The class of a structure all of whose sizes and conditions have been asked for; base: one it is a variant of."""
     scope = structure.scope
-    _refuse_kind(structure)
+    kind: type[Any] = base or (ModelicaConnector if _is_connector(structure) else ModelicaModel)
+    _refuse_kind(structure, kind._kinds)
     body: dict[str, Any] = {
         "__module__": Path(scope.source.name).name,
         "structure": structure,
@@ -112,7 +110,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     held = set(_held(structure))
     before = dict(_first_values(structure, held))
     for name, one in structure.members.items():
-        if name in TAKEN or name.startswith("_"):
+        if name in kind._taken or name.startswith("_"):
             scope.refuse(
                 one.element.declaration.at,
                 f"found a component '{name}', a name that is taken, expected another name",
@@ -132,20 +130,20 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             Bound(start, structure), unit="s", description="next instant of sample()"
         )
     if _is_connector(structure):
-        return type(scope.definition.name, (base or ModelicaConnector,), body)
+        return type(scope.definition.name, (kind,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)
-    return type(scope.definition.name, (base or ModelicaModel,), body)
+    return type(scope.definition.name, (kind,), body)
 
 
 def _is_connector(structure: Structure) -> bool:
     return structure.scope.definition.kind == "connector"
 
 
-def _refuse_kind(structure: Structure) -> None:
+def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in CLASSES or "operator" in definition.prefixes:
+    if definition.kind not in kinds or "operator" in definition.prefixes:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif "expandable" in definition.prefixes:
@@ -261,7 +259,7 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
     """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
     for section in structure.scope.sections:
-        if section.kind.startswith("initial") != initial:
+        if section.kind.startswith("initial") != initial or section.kind == "constraint":
             continue
         read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
         items = [one for one in section.items if not any(one is other for other in structure.started)]

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
@@ -12,6 +12,7 @@ from gantrytau.modelica.elaboration.classes import class_of
 from gantrytau.modelica.elaboration.modifiers import NOTHING
 from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.structure import Structure
+from gantrytau.modelica.optimizations import with_parameters
 from gantrytau.modelica.parser import parse, read_tree
 from gantrytau.modelica.source import SourceText
 
@@ -20,11 +21,17 @@ type Real end Real; type Integer end Integer; type Boolean end Boolean; type Str
 partial class ExternalObject end ExternalObject;
 type StateSelect = enumeration(never, avoid, default, prefer, always);
 type AssertionLevel = enumeration(warning, error);
+partial class OptimizationHorizon
+  parameter Real startTime(unit="s") = 0 "when it begins";
+  parameter Real finalTime(unit="s") = 1 "when it ends";
+end OptimizationHorizon;
 """
 
 
 class ModelicaLibrary:
     """Classes of Modelica text: `library["Package.Model"]` is a class as any other Model; keywords modify it."""
+
+    kinds: ClassVar[tuple[str, ...]] = ("model", "block", "connector", "record", "class")  # that are named
 
     def __init__(self, paths: Sequence[Path], libraries: Sequence[Path]):
         top = tree.ClassDefinition(
@@ -68,8 +75,7 @@ class ModelicaLibrary:
         left = [self.root.find_class(name, 0) for name in self.given]
         for one in left:
             left += [inner for inner in one.classes.values() if inner.around is one]
-        kinds = ("model", "block", "connector", "record", "class")
-        return tuple(sorted(one.name for one in left if one.definition.kind in kinds))
+        return tuple(sorted(one.name for one in left if one.definition.kind in self.kinds))
 
     def kind_of(self, name: str) -> str:
         """The word before the name of a class: model, block, connector, ...; "" for a partial one."""
@@ -92,8 +98,12 @@ class ModelicaLibrary:
                 )
             structure = Structure(scope, NOTHING, self)
             structure.prepare()
-            self._classes[name] = class_of(structure)
+            self._classes[name] = self.class_of(structure)
         return self._classes[name]
+
+    def class_of(self, structure: Structure) -> type[Any]:
+        """The class of a structure that is prepared."""
+        return class_of(structure)
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
@@ -110,6 +120,9 @@ class ModelicaLibrary:
         return called_class(scope, arguments, named, self, self.package(scope))
 
 
+Library = TypeVar("Library", bound=ModelicaLibrary)
+
+
 def load_modelica(
     *paths: str | os.PathLike[str], libraries: Iterable[str | os.PathLike[str]] = ()
 ) -> ModelicaLibrary:
@@ -118,8 +131,18 @@ def load_modelica(
     paths: `.mo` files, and folders of packages; libraries: folders in which packages are looked for by name when a class
     needs them, those of MODELICAPATH too. Raises ModelError with file, line and column for what is no Modelica.
     """
+    return loaded(ModelicaLibrary, "load_modelica('robot.mo')", paths, libraries)
+
+
+def loaded(
+    made: type[Library],
+    example: str,
+    paths: Sequence[str | os.PathLike[str]],
+    libraries: Iterable[str | os.PathLike[str]],
+) -> Library:
+    """The classes of files and folders as a library of this kind; example: of a call, for messages."""
     if not paths:
-        raise ModelError("load_modelica: found no file, expected at least one, as load_modelica('robot.mo')")
+        raise ModelError(f"{example.partition('(')[0]}: found no file, expected at least one, as {example}")
     given = [Path(p) for p in ([libraries] if isinstance(libraries, str | os.PathLike) else libraries)]
     others = [Path(p) for p in os.environ.get("MODELICAPATH", "").split(os.pathsep) if p]
     for folder in given:
@@ -129,9 +152,7 @@ def load_modelica(
                 place=str(folder),
                 argument="libraries",
             )
-    return ModelicaLibrary(
-        [Path(p) for p in paths], [*given, *(folder for folder in others if folder.is_dir())]
-    )
+    return made([Path(p) for p in paths], [*given, *(folder for folder in others if folder.is_dir())])
 
 
 def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
@@ -146,7 +167,9 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
             )
             inner = around.classes[part] = ClassScope(name, found.source, around)
         around = inner
-    return [ClassScope(one, found.source, around) for one in found.classes]
+    optimica = found.source.optimica
+    classes = [with_parameters(one, found.source) if optimica else one for one in found.classes]
+    return [ClassScope(one, found.source, around) for one in classes]
 
 
 def package_in(folder: Path, around: ClassScope) -> ClassScope:

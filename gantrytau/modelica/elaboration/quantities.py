@@ -18,6 +18,7 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.freedom import is_free, without_optimica
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -36,7 +37,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
             value = structure.member(name)
             body[name] = value if isinstance(value, (bool, int, float, str)) else None
         return
-    said = _attributes(one, one.own, structure)
+    said = _attributes(one, without_optimica(one, one.own, True), structure)
     words: dict[str, Any] = {"description": one.element.declaration.description or ""}
     words |= {k: v for k, v in said.items() if k not in ("value", "prefer")}
     if 0 in one.shape:
@@ -46,18 +47,22 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
             one.element.declaration.at, f"found {len(one.shape)} dimensions of '{name}', expected at most two"
         )
     if one.is_parameter:
-        for key in ("start", "fixed"):
+        for key in ("start", "fixed", "free"):
             words.pop(key, None)
         fold = _flag(one, "Evaluate")
-        body[name] = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        body[name] = parameter = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        parameter.free = is_free(one)
         return
+    words.pop("free", None)
     if held:
         start = words.pop("start", 0.0)
         start = Bound(before, structure) if before is not None else start
         words.pop("fixed", None)
         body[name] = Discrete(start, shape=one.shape, **words)
         return
-    kind = next((made for word, made in KINDS.items() if word in one.prefixes), Real)
+    kind = next(
+        (made for word, made in KINDS.items() if word in one.prefixes), Input if is_free(one) else Real
+    )
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
@@ -89,7 +94,7 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
-        elif name == "fixed":
+        elif name in ("fixed", "free"):
             value = structure.folded(attribute.seen_from(structure))
             each = set(np.ravel(value))
             if len(each) > 1:
@@ -140,8 +145,8 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
         elif one.primitive is None:
             found[name] = [keywords_of(x, inner.of_element(k), structure) for k, x in enumerate(one.children)]
         elif not one.is_folded and 0 not in one.shape:
-            attributes = _attributes(one, inner, structure)
-            if one.is_parameter:
-                attributes = {k: v for k, v in attributes.items() if k not in ("start", "fixed")}
+            attributes = _attributes(one, without_optimica(one, inner, False), structure)
+            left_out = ("start", "fixed") if one.is_parameter else ("free",)
+            attributes = {k: v for k, v in attributes.items() if k not in left_out}
             found[name] = attributes
     return {name: one for name, one in found.items() if one}
