@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.modelica.elaboration.modifiers import Modifier
-from gantrytau.modelica.elaboration.structure import ClassMember
+from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 
 GUESS = 1.0  # of a free parameter of which nothing is said
 
@@ -15,6 +15,14 @@ def is_free(one: ClassMember) -> bool:
     """Whether a text leaves a quantity to the optimiser."""
     said = one.full.inner.get("free")
     return said is not None and said.value is not None and _flag(one, said)
+
+
+def inside_optimization(structure: Structure) -> bool:
+    """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
+    root = structure
+    while root.around is not None:
+        root = root.around
+    return root is not structure and root.scope.definition.kind == "optimization"
 
 
 def _flag(one: ClassMember, said: Modifier) -> bool:

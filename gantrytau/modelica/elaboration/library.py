@@ -9,6 +9,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import called_class
 from gantrytau.modelica.elaboration.classes import class_of
+from gantrytau.modelica.elaboration.former_names import renamed
 from gantrytau.modelica.elaboration.modifiers import NOTHING
 from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.structure import Structure
@@ -184,7 +185,7 @@ def package_in(folder: Path, around: ClassScope) -> ClassScope:
             )
         )
     made = ClassScope(definition, found.source, around)
-    made.more = lambda name: _in_folder(folder, name, made)
+    made.more = lambda name: _in_folder(folder, name, made) or renamed(made, name)
     return made
 
 

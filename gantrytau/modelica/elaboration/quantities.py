@@ -18,7 +18,7 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.freedom import is_free, without_optimica
+from gantrytau.modelica.elaboration.freedom import inside_optimization, is_free, without_optimica
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -60,9 +60,11 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
         words.pop("fixed", None)
         body[name] = Discrete(start, shape=one.shape, **words)
         return
-    kind = next(
-        (made for word, made in KINDS.items() if word in one.prefixes), Input if is_free(one) else Real
-    )
+    kind = next((made for word, made in KINDS.items() if word in one.prefixes), Real)
+    if is_free(one):
+        kind = Input
+    elif kind is Input and inside_optimization(structure):
+        kind = Real  # which the equations around it determine
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]

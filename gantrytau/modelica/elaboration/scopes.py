@@ -1,6 +1,6 @@
 """Where names are looked up (Modelica 3.6, chapter 5): classes, what they inherit and import, and what lies around them."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NoReturn
@@ -306,15 +306,31 @@ class ClassScope:
                 at,
                 f"found '{name}', expected the name of a class{hint} A library is given by its folder, libraries=",
             )
-        for part in rest:
-            inner = found.inherited_class(part)
+        inner, outer = found.at_path(rest), found.around
+        while inner is None and outer is not None and (further := outer.around and outer.around.first(first)):
+            inner, outer = further.at_path(rest), further.around  # a package and a class in it of one name
+        if inner is None:
+            found, part = found.last_class(rest)
+            self.refuse(
+                at,
+                f"found '{name}', but {found.name} has no class '{part}'{did_you_mean(part, found.names())}",
+            )
+        return inner
+
+    def last_class(self, path: Sequence[str]) -> "tuple[ClassScope, str]":
+        """The class to which a path of names leads, and the first name that is not there, or ""."""
+        here = self
+        for part in path:
+            inner = here.inherited_class(part)
             if inner is None:
-                self.refuse(
-                    at,
-                    f"found '{name}', but {found.name} has no class '{part}'{did_you_mean(part, found.names())}",
-                )
-            found = inner
-        return found
+                return here, part
+            here = inner
+        return here, ""
+
+    def at_path(self, path: Sequence[str]) -> "ClassScope | None":
+        """The class to which a path of names leads; None where there is none."""
+        found, missing = self.last_class(path)
+        return None if missing else found
 
     def known_names(self) -> list[str]:
         """Names of classes that can be said here, for messages."""

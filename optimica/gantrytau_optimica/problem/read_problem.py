@@ -39,6 +39,7 @@ from gantrytau_optimica.problem.problem_checks import (
 )
 from gantrytau_optimica.problem.problem_units import check_problem_units
 from gantrytau_optimica.problem.start_targets import with_told_starts
+from gantrytau_optimica.problem.steady_state import at_rest
 from gantrytau_optimica.problem.symbolic_problem import (
     ConstraintRow,
     LinkedPaths,
@@ -68,6 +69,9 @@ def read_problem(
     name = type(root).__name__
     flat = write_out(instance) if change is None else change(write_out(instance))
     known = set(flat.derivatives)
+    flat = at_rest(flat) if root.static else flat
+    if all(one.failure for one in flat.whens):  # assertions, which a simulation of the answer tells
+        flat = replace(flat, whens=())
     stages = _stages(name, instance)
     for _, one in stages:
         check_spelling(type(one))

@@ -16,7 +16,7 @@ from gantrytau.modelica.elaboration.statements import looped
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.text.timed_values import TimedInterpreter
 
-OWN = {"given", "inputs", "objective", "integrand", "constraints", "start_time", "final_time"}
+OWN = {"given", "inputs", "objective", "integrand", "constraints", "start_time", "final_time", "static"}
 
 
 class TextOptimization(ModelicaModel, Optimization):
@@ -36,6 +36,18 @@ class TextOptimization(ModelicaModel, Optimization):
     def final_time(self) -> Any:
         """When it ends, in s."""
         return self.finalTime
+
+    @property
+    def static(self) -> bool:
+        """Whether all is at rest."""
+        found = argument_of(type(self).structure.scope, "static")
+        if found is None:
+            return False
+        scope, expression = found
+        value = self._reader(scope).value(expression)
+        if not isinstance(value, bool):
+            scope.refuse(expression.at, f"found {value!r} as static, expected true or false")
+        return value
 
     def objective(self) -> Any:
         return self._cost("objective")

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import casadi as ca
+import numpy as np
 import pytest
 
-from gantrytau import Model
+from gantrytau import Model, simulate
 from gantrytau_optimica import Optimization, load_optimica, optimize
 
 HERE = Path(__file__).parent
@@ -53,3 +55,19 @@ def test_costs_of_known_meshes(problems, name, elements, points, value):
 )
 def test_refined_optima(problems, name, value):
     assert objective(problems[f"Problems.{name}"], elements=20, refine=1e-6) == pytest.approx(value, rel=1e-6)
+
+
+def test_static_problems(problems):
+    box = optimize(problems["Problems.Box"])
+    assert [box["width"], box["depth"], box["height"]] == pytest.approx([2, 2, 1], rel=SAME)  # by hand
+    assert optimize(problems["Problems.SteadyTank"])["inflow"] == pytest.approx(0.5, rel=SAME)  # sqrt(0.25)
+
+
+def test_parameters_from_measured_points(problems):
+    holes, times = (0.0265670e-4, 0.0271390e-4), np.arange(0, 61, 10.0)
+    inputs = {"u": lambda t: [5 + ca.sin(t / 5), 6 - ca.sin(t / 5)]}
+    tanks = problems["Problems.Tanks"](a=[*holes, 0.03e-4, 0.03e-4])
+    filled = simulate(tanks, stop=60.0, inputs=inputs, tolerance=1e-10)
+    levels = [[filled.at(t, f"x[{k}]") for k in (1, 2)] for t in times]
+    found = optimize(problems["Problems.TankHoles"](y=levels), elements=12)
+    assert [found["a1"], found["a2"]] == pytest.approx(holes, rel=1e-6)  # of collocation with 5 s an element
