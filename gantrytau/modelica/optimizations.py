@@ -18,6 +18,10 @@ def with_parameters(one: tree.ClassDefinition, source: SourceText) -> tree.Class
     if not isinstance(body, tree.Composition):
         return one
     sections = tuple(replace(s, items=tuple(_item(i, source) for i in s.items)) for s in body.sections)
+    stray = next((s for s in sections if s.kind == "constraint"), None)
+    if one.kind != "optimization" and stray is not None:
+        words = f"found constraints in the {one.kind} {one.name}, expected them in an optimization"
+        raise ModelError(source.told(stray.at, words))
     if one.kind != "optimization":
         return replace(one, body=replace(body, sections=sections))
     own: list[tree.Element] = [tree.Extends(one.at, f".{HORIZON}", None, None)]

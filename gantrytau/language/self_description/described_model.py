@@ -166,7 +166,7 @@ def _settings(kind: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for base in reversed(kind.__mro__):
         found |= {n: v for n, v in vars(base).items() if is_setting(v, n) and n not in HIDDEN}
-    return {n: v for n, v in found.items() if n not in kind.members()}
+    return {n: v for n, v in found.items() if n not in kind.members() and is_setting(getattr(kind, n), n)}
 
 
 def _settings_of(part: PlacedPart) -> Iterator[Listing]:

@@ -17,6 +17,16 @@ def is_free(one: ClassMember) -> bool:
     return said is not None and said.value is not None and _flag(one, said)
 
 
+def refuse_free(one: ClassMember) -> None:
+    """TextError for a parameter that is left to the optimiser, but shapes the model or is no Real."""
+    if is_free(one) and (one.is_folded or one.kind != "Real"):
+        said = one.full.inner["free"]
+        shapes = "shapes the model" if one.is_folded else f"is {one.kind}"
+        said.scope.refuse(
+            said.at, f"found '{one.name}' free, which {shapes}, expected a Real on which no size depends"
+        )
+
+
 def inside_optimization(structure: Structure) -> bool:
     """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
     root = structure
@@ -45,11 +55,6 @@ def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifi
             attribute.scope.refuse(
                 attribute.at, f"found '{name}', which is Optimica, expected it in a .mop file"
             )
-    if free is not None and is_free(one) and one.is_parameter and (one.is_folded or one.kind != "Real"):
-        words = (
-            f"found '{one.name}' free, which is {one.kind} or shapes the model, expected a Real that does not"
-        )
-        free.scope.refuse(free.at, words)
     if one.is_parameter and is_free(one):
         guess = guess or inner.get("start")
         if guess is not None:

@@ -330,6 +330,10 @@ class Interpreter:
         if found is None and name == "pure":
             return arguments[0]
         name = name.removeprefix(".") if found is None or found.predefined else name
+        if found is None and self.members.has(name.partition(".")[0]):
+            raise ModelError(
+                f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
+            )
         if "." not in name and (found is None or found.predefined):
             return values.called(name, arguments, named)
         return self.library.call(self.scope.find_class(name, e.at), arguments, named)

@@ -18,7 +18,7 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.freedom import inside_optimization, is_free, without_optimica
+from gantrytau.modelica.elaboration.freedom import inside_optimization, is_free, refuse_free, without_optimica
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -32,6 +32,7 @@ IGNORED = {"quantity", "unbounded"}
 def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Modifier | None) -> None:
     """The declaration of a number, Boolean, text or enumeration; nothing for a constant that is no plain value."""
     name, structure = one.name, one.owner
+    refuse_free(one)
     if one.is_folded:
         if one.full.value is not None:
             value = structure.member(name)
@@ -107,6 +108,7 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:
             known = (*NUMBERS, *TEXTS, "fixed", "stateSelect", "quantity")
+            known += ("free", "initialGuess") if attribute.scope.source.optimica else ()
             attribute.scope.refuse(
                 attribute.at, f"found '{name}', which {one.kind} does not have{did_you_mean(name, known)}"
             )

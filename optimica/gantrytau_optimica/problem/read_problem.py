@@ -33,6 +33,7 @@ from gantrytau_optimica.problem.optimization import (
 )
 from gantrytau_optimica.problem.problem_checks import (
     check_constraints,
+    check_integrands,
     check_objective,
     check_spelling,
     check_times,
@@ -127,6 +128,7 @@ def _checked(said: _Said, instance: Instance, guess: Any) -> SymbolicProblem:
     for one in (*points, *targets):
         refuse_calls(str(one.symbol), one.expression)
     check_constraints(said.constraints, targets)
+    check_integrands(name, phases, points)
     check_problem_units(replace(flat, derivatives=derivatives), said.constraints, points, times)
     told = partial(with_told_starts, flat, said.constraints, points, guess)
     dae = _translated(flat, said.given, said.mentioned, told)

@@ -1,7 +1,8 @@
 """An optimization of Optimica text as an Optimization: its costs and constraints read from the tree."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -50,22 +51,22 @@ class TextOptimization(ModelicaModel, Optimization):
         return value
 
     def objective(self) -> Any:
-        return self._cost("objective")
+        return self._cost("objective", "may" if self.static else "only")
 
     def integrand(self) -> Any:
-        return self._cost("objectiveIntegrand")
+        return self._cost("objectiveIntegrand", "never")
 
     def constraints(self) -> Iterator[Any]:
         for section in type(self).structure.scope.sections:
             if section.kind == "constraint":
                 yield from _constraints(section.items, self._reader(section.scope))
 
-    def _cost(self, name: str) -> Any:
+    def _cost(self, name: str, instants: Literal["only", "may", "never"]) -> Any:
         found = argument_of(type(self).structure.scope, name)
         if found is None:
             return 0.0
         scope, expression = found
-        value = self._reader(scope).value(expression)
+        value = replace(self._reader(scope), instants=instants).value(expression)
         if isinstance(value, (bool, str, list, np.ndarray)) or hasattr(value, "member"):
             scope.refuse(expression.at, f"found {_kind(value)} as {name}, expected a number")
         return value
@@ -102,6 +103,10 @@ def _constraints(items: Sequence[Any], reader: TimedInterpreter) -> Iterator[Any
 
 def _constraint(item: Any, reader: TimedInterpreter) -> Iterator[Any]:
     if isinstance(item, tree.SimpleEquation):
+        if isinstance(item.right, tree.Binary) and item.right.operator in values.RELATIONS:
+            raise ModelError(
+                f"found a second relation '{item.right.operator}', expected one; write two constraints"
+            )
         yield from _rows(item.relation, reader.value(item.left), reader.value(item.right))
     elif isinstance(item, tree.ForLoop):
         for inner in looped(item, reader):

@@ -6,10 +6,40 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from gantrytau import Model, simulate
+from gantrytau import Model, ModelError, simulate
 from gantrytau_optimica import Optimization, load_optimica, optimize
 
 HERE = Path(__file__).parent
+PLANT = """
+  model Plant
+    Real x(start = 1, fixed = true);
+    input Real u;
+  equation
+    der(x) = u - x;
+  end Plant;
+  optimization P("""
+WRONG = [  # arguments and body of an optimization, column in line 8, and what is said
+    ("objectve = x(finalTime)) extends Plant;", 18, "'objectve', which .* did you mean 'objective'"),
+    ("finalTime = 1, finalTime = 2) extends Plant;", 33, "second 'finalTime'"),
+    ("objective) extends Plant;", 18, "'objective' without a value, expected objective = "),
+    ("objective = {1, 2}) extends Plant;", 30, r"an array \[2\] as objective, expected a number"),
+    ("objective = x) extends Plant;", 30, r"'x', which changes over time, expected .* x\(finalTime\)"),
+    ("objectiveIntegrand = x(finalTime)) extends Plant;", 39, "'x' at a time in an integrand"),
+    ("objective = x(0, 1)) extends Plant;", 30, r"expected one time, as x\(finalTime\)"),
+    ("objective = x(u)) extends Plant;", 30, r"x\(u\), expected a time of numbers and parameters"),
+    ("objective = p(1)) Plant p(u = 1);", 30, "component 'p' called with a time"),
+    ("static = 2) extends Plant;", 27, "2 as static, expected true or false"),
+    (") extends Plant; parameter Integer n(free = true) = 3;", 55, "'n' free, which is Integer"),
+    (") extends Plant(x(initalGuess = 2));", 36, "did you mean 'initialGuess'"),
+    (") extends Plant; Real inputs = x;", 40, "'inputs', a name that is taken"),
+    (") extends Plant; equation u = x(0);", 48, "'x' with a time, expected that in costs and constraints"),
+    (") extends Plant; constraint x < 1;", 48, "expected '=', '<=' or '>='"),
+    (") extends Plant; constraint 0 <= x <= 1;", 46, "a second relation '<=', .* write two constraints"),
+    (") extends Plant; constraint 1 <= 0;", 46, "1 <= 0, which never holds"),
+    (") extends Plant; constraint {x, u} <= {1, 2, 3};", 46, r"sizes \[2\] and \[3\] beside '<='"),
+    (") extends Plant; constraint if x > 0 then u <= 1; end if;", 46, "a condition that varies"),
+    (") extends Plant; constraint connect(x, u);", 46, "what is no constraint, expected"),
+]
 SAME = 1e-7  # ten times the tolerance of Ipopt, of the size of an objective
 
 
@@ -71,3 +101,20 @@ def test_parameters_from_measured_points(problems):
     levels = [[filled.at(t, f"x[{k}]") for k in (1, 2)] for t in times]
     found = optimize(problems["Problems.TankHoles"](y=levels), elements=12)
     assert [found["a1"], found["a2"]] == pytest.approx(holes, rel=1e-6)  # of collocation with 5 s an element
+
+
+@pytest.mark.parametrize(("text", "column", "words"), WRONG, ids=[one[0] for one in WRONG])
+def test_wrong_text_is_told_with_its_place(tmp_path, text, column, words):
+    file = tmp_path / "wrong.mop"
+    file.write_text(f"package W{PLANT}{text} end P;\nend W;\n")
+    with pytest.raises(ModelError, match=rf"wrong.mop, line 8, column {column}: found .*{words}"):
+        optimize(load_optimica(file)["W.P"], elements=2)
+
+
+def test_a_model_has_no_constraints_and_a_mo_file_no_optimization(tmp_path):
+    (tmp_path / "model.mop").write_text("model M Real x = 1; constraint x <= 2; end M;")
+    with pytest.raises(ModelError, match="line 1, column 21: found constraints in the model M"):
+        load_optimica(tmp_path / "model.mop")
+    (tmp_path / "model.mo").write_text("model M Real x(free = true); end M;")
+    with pytest.raises(ModelError, match=r"found 'free', which is Optimica, expected it in a \.mop file"):
+        load_optimica(tmp_path / "model.mo")["M"]
