@@ -61,12 +61,13 @@ def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifi
             return replace(_as_value(one, guess), inner=inner)
         if said.value is None and declared:
             return Modifier(_spread(one, GUESS), said.scope, inner=inner, at=said.at)
-    elif guess is not None and not _is_fixed(one):
+    elif guess is not None and not is_fixed(one):
         inner["start"] = guess
     return replace(said, inner=inner)
 
 
-def _is_fixed(one: ClassMember) -> bool:
+def is_fixed(one: ClassMember) -> bool:
+    """Whether the start value of a variable holds."""
     said = one.full.inner.get("fixed")
     return said is not None and said.value is not None and _flag(one, said)
 

@@ -18,7 +18,13 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.freedom import inside_optimization, is_free, refuse_free, without_optimica
+from gantrytau.modelica.elaboration.freedom import (
+    inside_optimization,
+    is_fixed,
+    is_free,
+    refuse_free,
+    without_optimica,
+)
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -55,6 +61,8 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
         parameter.free = is_free(one)
         return
     words.pop("free", None)
+    if "start" not in one.full.inner and is_fixed(one):
+        words.setdefault("start", 0.0)
     if held:
         start = words.pop("start", 0.0)
         start = Bound(before, structure) if before is not None else start
