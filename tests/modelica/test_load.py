@@ -253,9 +253,54 @@ WRONG = (  # text of a model, line and column, words
         "found 'n', whose value needs itself",
     ),
 )
+FUNCTION = "function f\n  input Real u[2];\n  output Integer n = integer(u[1]);\nend f;\n"
+MEANINGS = (  # where a wrong model would run: text, line and column, words
+    (
+        "model A\n  parameter Real p;\nend A;\nmodel M\n  A a[2](p={1, 2, 3});\nend M;",
+        "5:10",
+        "found 3 values for",
+    ),
+    ("model M\n  Real x[2](start=1);\nend M;", "2:13", "found a scalar, expected \\[2\\]; 'each'"),
+    (
+        FUNCTION + "model M\n  Real x = f({1, 2, 3});\nend M;",
+        "2:14",
+        "found \\[3\\] for 'u', expected \\[2\\]",
+    ),
+    ("model M\n  Boolean b = time;\nend M;", "2:15", "found Real for 'b', expected Boolean"),
+    ("model M\n  parameter String s = 3.5;\nend M;", "2:24", "found 3.5 for 's', expected String"),
+    ("model M\n  Boolean b = time > 1;\n  Real x = b + 1;\nend M;", "3:12", "found Boolean beside '\\+'"),
+    (
+        "model M\n  Integer n(start=0);\nequation\n  when time > 1 then\n    n = 2 * time;\n  end when;\nend M;",
+        "5:9",
+        "found Real .*, expected Integer; integer\\(\\)",
+    ),
+    (
+        "type E = enumeration(a);\ntype F = enumeration(c);\nmodel M\n  parameter E e = E.a;\n"
+        "  Boolean b = e == F.c;\nend M;",
+        "5:20",
+        "found F beside E",
+    ),
+    (
+        "package A\n  constant Real k=1;\nend A;\npackage B\n  constant Real k=2;\nend B;\nmodel M\n  import A.*;\n"
+        "  import B.*;\n  Real x = k;\nend M;",
+        "9:10",
+        "found 'k' imported as A.k and as B.k",
+    ),
+    (
+        "model A\n  constant Real k=1;\nend A;\nmodel B\n  constant Real k=2;\nend B;\nmodel M\n  extends A;\n"
+        "  extends B;\nend M;",
+        "7:7",
+        "found 'k' declared differently in A and in B",
+    ),
+    (
+        "model A\nprotected\n  parameter Real p=1;\nend A;\nmodel M\n  A a(p=2);\nend M;",
+        "6:7",
+        "found 'p' modified, which is protected in A",
+    ),
+)
 
 
-@pytest.mark.parametrize(("text", "place", "words"), WRONG, ids=range(len(WRONG)))
+@pytest.mark.parametrize(("text", "place", "words"), [*WRONG, *MEANINGS])
 def test_wrong_text_is_refused_by_line_and_column(text, place, words, tmp_path):
     (tmp_path / "wrong.mo").write_text(text)
     line, column = place.split(":")

@@ -11,6 +11,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
+from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import Items, looped
 from gantrytau.modelica.elaboration.values import RecordValue
@@ -24,10 +25,14 @@ class LeftBlock(Exception):
 
 @dataclass
 class Execution:
-    """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before."""
+    """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before.
+
+    shapes: the sizes of what is declared with sizes.
+    """
 
     reader: Interpreter
     known: dict[str, Any] = field(default_factory=dict)
+    shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def run(self, items: Items, local: Mapping[str, Any] | None = None) -> None:
         """Carry out statements, one after another; local: values of the iterators around them."""
@@ -74,10 +79,37 @@ class Execution:
                         target.at,
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
+                wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
+                kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
+                if not fits(wanted, kind):
+                    reader.scope.refuse(target.at, f"found {kind} for '{name}', expected {wanted}")
+                if target.parts == ((name, ()),):
+                    self._check_shape(name, one, target.at)
                 try:
                     self.known[name] = _with(self.known[name], target.parts, one, reader)
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
+
+    def _check_shape(self, name: str, value: Any, at: int) -> None:
+        shape = self.shapes.get(name)
+        if shape is not None and isinstance(value, (np.ndarray, bool, int, float, ca.SX)):
+            found = np.shape(value) if isinstance(value, np.ndarray) else ()
+            if found != shape:
+                words = f"found {values.sized(value)} for '{name}', expected {values.sized(np.empty(shape))}"
+                self.reader.scope.refuse(at, words)
+
+    def declare(self, name: str, element: Element, value: Any) -> None:
+        """Let a variable of a function have a value; TextError for one of another type or size than is declared."""
+        self.known[name] = value
+        reader = replace(self.reader, scope=element.scope, local={**self.reader.local, **self.known})
+        sizes = [*element.declaration.subscripts, *element.clause.subscripts]
+        at, wanted = element.declaration.at, reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
+        if not fits(wanted, kind := type_of_value(value)):
+            reader.scope.refuse(at, f"found {kind} for '{name}', expected {wanted}")
+        if not any(isinstance(one, tree.Mark) for one in sizes) and not _is_array_type(element):
+            self.shapes[name] = tuple(reader.value(one) for one in sizes)
+            if value is not None:
+                self._check_shape(name, value, at)
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
         for inner in looped(item, reader):
@@ -171,7 +203,8 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
 
 def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
     """The equations that an algorithm of a model amounts to: one for each variable that it assigns."""
-    run = Execution(reader, dict.fromkeys(_assigned(items)))
+    names = dict.fromkeys(_assigned(items))
+    run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
     run.run(items)
     for name, value in run.known.items():
         left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
@@ -223,7 +256,9 @@ def called_class(
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
     run = Execution(Interpreter(scope, constants, beyond), {})
     for name, element in scope.elements.items():
-        run.known[name] = given[name] if name in given else _initial(name, element, run, name in inputs)
+        run.declare(
+            name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
+        )
     if record:
         return RecordValue(run.known)
     try:

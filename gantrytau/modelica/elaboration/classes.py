@@ -9,7 +9,7 @@ from gantrytau.language.declarations import Array, Discrete
 from gantrytau.language.model import Connector, Declared, Model, Outer
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged
+from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.statements import (
@@ -19,7 +19,7 @@ from gantrytau.modelica.elaboration.statements import (
     sample_calls,
     stated,
 )
-from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
+from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 
 CLASSES = ("model", "block", "connector", "record", "class")
 TAKEN = {
@@ -212,7 +212,7 @@ def _component(one: ClassMember) -> Any:
     def element(index: int) -> Any:
         child = one.children[index]
         made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index), owner))
+        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
 
     found = Array(Declared, 0)
     found.elements = [element(k) for k in range(one.shape[0])]

@@ -38,6 +38,10 @@ class Members(Protocol):
         """The next instant of a `sample`."""
         ...
 
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
+        ...
+
     def is_fixed(self, expression: tree.Expression) -> bool:
         """Whether it holds parameters and constants only."""
         ...
@@ -322,17 +326,21 @@ class Interpreter:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
             return time >= self.members.next_sample(e)
-        keyword = name in ("der", "pure", "initial")
-        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
-        found = None if keyword else start.first(first.split(".")[0])
+        name, function = self.function(e)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
-        if found is None and name == "pure":
-            return arguments[0]
-        name = name.removeprefix(".") if found is None or found.predefined else name
-        if "." not in name and (found is None or found.predefined):
-            return values.called(name, arguments, named)
-        return self.library.call(self.scope.find_class(name, e.at), arguments, named)
+        if function is not None:
+            return self.library.call(function, arguments, named)
+        return arguments[0] if name == "pure" else values.called(name, arguments, named)
+
+    def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
+        """The name of the function that is called, and its class; None for one of the language."""
+        name = ".".join(part for part, _ in e.function.parts)
+        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
+        found = None if name in ("der", "pure", "initial") else start.first(first.split(".")[0])
+        if "." not in first and (found is None or found.predefined):
+            return first, None
+        return name, self.scope.find_class(name, e.at)
 
     def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
         """The sizes of a component by its plain name, which say nothing of its value; None for all else."""

@@ -13,7 +13,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.statements import AbsentComponent
-from gantrytau.modelica.elaboration.structure import Structure, picked
+from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
 
 
@@ -54,6 +54,9 @@ class PlacedMembers:
     def shape(self, name: str) -> tuple[int, ...] | None:
         return self.structure.shape(name) if self.structure else None
 
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        return "" if self.structure is None else self.structure.type_of(reference)
+
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
@@ -70,11 +73,11 @@ def _by_size(found: ca.SX) -> Any:
 
 
 class Bound(Formula):
-    """What Modelica text says of a value, computed in the instance whose class says it."""
+    """What Modelica text says of a value, computed in the instance whose class says it. shape: of what it is the value."""
 
-    def __init__(self, modifier: Modifier, structure: Structure):
+    def __init__(self, modifier: Modifier, structure: Structure, shape: tuple[int, ...] | None = None):
         super().__init__(None)  # type: ignore[arg-type]
-        self.modifier, self.structure = modifier, structure
+        self.modifier, self.structure, self.shape = modifier, structure, shape
 
     def evaluate(self, scope: Any) -> Any:
         """The value where `scope` is that instance."""
@@ -87,7 +90,14 @@ class Bound(Formula):
                 self.modifier.scope.refuse(
                     self.modifier.at, f"found {error}, expected a component that is there"
                 )
-        found = values.to_casadi(picked(found, self.modifier.path))
+        found = self.modifier.picked(found)
+        shape = np.shape(found) if isinstance(found, np.ndarray) else ()
+        alike = self.shape in (None, shape) or (self.modifier.each and not shape)
+        if not alike and isinstance(self.modifier.value, tree.TreeNode):
+            hint = "" if shape else "; 'each' before the name takes one value for all"
+            words = f"found {values.sized(found)}, expected {values.sized(np.empty(self.shape or ()))}{hint}"
+            self.modifier.scope.refuse(self.modifier.at, words)
+        found = values.to_casadi(found)
         return float(found) if isinstance(found, bool) else found
 
     def parts(self) -> tuple[str, tuple[Any, ...]]:

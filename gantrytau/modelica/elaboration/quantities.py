@@ -18,6 +18,7 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -76,7 +77,10 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     """The attributes of a quantity that a modification in a class sets, by the names of the language."""
     found: dict[str, Any] = {}
     if said.value is not None:
-        found["value"] = Bound(said, structure)
+        if not any(isinstance(step, str) for step in said.path):
+            reader = structure.interpreter(said.scope, said.node)
+            check_type(one.type_name, said.value, reader, f"'{one.name}'", said.at)
+        found["value"] = Bound(said, structure, one.shape)
     for name, attribute in said.inner.items():
         if attribute.value is None or name in IGNORED:
             continue
@@ -84,7 +88,7 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
             attribute.scope.refuse(attribute.at, words)
         elif name in NUMBERS:
-            found[name] = Bound(attribute, structure)
+            found[name] = Bound(attribute, structure, one.shape)
         elif name in TEXTS:
             found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
             if not isinstance(text, str):
@@ -138,7 +142,10 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
         if one.primitive is None and not one.shape:
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
-            found[name] = [keywords_of(x, inner.of_element(k), structure) for k, x in enumerate(one.children)]
+            found[name] = [
+                keywords_of(x, inner.of_element(k, len(one.children)), structure)
+                for k, x in enumerate(one.children)
+            ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, inner, structure)
             if one.is_parameter:

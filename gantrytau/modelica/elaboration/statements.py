@@ -14,8 +14,9 @@ from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
+from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
-from gantrytau.modelica.elaboration.structure import nodes_of
+from gantrytau.modelica.references import nodes_of
 
 ROUNDING = 1e-6  # of a period, by which an instant may be located early
 Items = Sequence[tree.EquationOrStatement]
@@ -42,6 +43,7 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
             off = Happening(logic_not(right), (left == 0,), initially=True)
             yield WhenChain((Happening(right, (left == 1,), initially=True), off))
     elif isinstance(item, tree.SimpleEquation):
+        _check_types(item, reader)
         for left, right in sides(item, reader):
             yield left == right
     elif isinstance(item, tree.ConnectEquation):
@@ -62,6 +64,18 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
         yield from _call(item, reader)
     else:
         raise ModelError("found a statement among equations, expected an equation")
+
+
+def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool = False) -> None:
+    """TextError for sides of types that do not go together; assigned: whether the left one takes the other's value."""
+    if isinstance(item.left, tree.OutputList):
+        return
+    left = type_of(item.left, reader)
+    plain = isinstance(item.left, tree.ComponentReference) and not isinstance(
+        item.right, tree.ComponentReference
+    )
+    if assigned or plain or not fits(type_of(item.right, reader), left):
+        check_type(left, item.right, reader, f"the right side of an equation of {left}", item.right.at)
 
 
 def first_valued(item: tree.EquationOrStatement) -> str:
@@ -252,6 +266,7 @@ def _is_call(e: tree.Expression, name: str) -> bool:
 def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
     for item in items:
         if isinstance(item, tree.SimpleEquation):
+            _check_types(item, reader, assigned=True)
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):

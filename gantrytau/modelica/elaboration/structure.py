@@ -3,7 +3,7 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,25 +13,11 @@ import numpy as np
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
+from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue, is_number
-
-
-def picked(value: Any, path: Sequence[int | str]) -> Any:
-    """The part of a value that indices and names of members choose."""
-    for step in path:
-        if isinstance(step, str):
-            value = value[step] if isinstance(value, RecordValue) else value.member(step)
-        elif isinstance(value, (list, np.ndarray)) and step < len(value):
-            value = value[step]
-        else:
-            many = isinstance(value, (list, np.ndarray))
-            raise ModelError(
-                f"found {f'{len(value)} values' if many else 'a scalar'} for an array of components, expected one value for "
-                "each; 'each' before the name takes one value for all"
-            )
-    return value
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
+from gantrytau.modelica.references import references
 
 
 @dataclass(eq=False)
@@ -62,6 +48,13 @@ class Structure:
                 one.scope.refuse(
                     one.at, f"found '{name}' modified, which {self.scope.name} does not have{hint}"
                 )
+            element = self.scope.elements.get(name)
+            if element is not None and element.protected and one.scope is not None:
+                one.scope.refuse(
+                    one.at,
+                    f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component; extend "
+                    f"{self.scope.name} to modify it",
+                )
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
     def has(self, name: str) -> bool:
@@ -85,7 +78,13 @@ class Structure:
         found = modifier.value
         if isinstance(found, tree.TreeNode):
             found = self.interpreter(modifier.scope, modifier.node).value(found)
-        return picked(found, modifier.path)
+        return modifier.picked(found)
+
+    def _refused(self, said: Modifier, words: str) -> ModelError:
+        """The error of a modification, with its line where it stands in a text."""
+        return (
+            TextError(said.scope.source.told(said.at, words)) if said.scope is not None else ModelError(words)
+        )
 
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
@@ -113,6 +112,8 @@ class Structure:
             if literal not in one.literals:
                 raise ModelError(f"found {found!r} for '{name}'{did_you_mean(literal, one.literals)}")
             return EnumerationValue(one.literals.index(literal) + 1, literal, one.primitive.name)
+        if not fits(one.type_name, type_of_value(found)):
+            raise self._refused(one.full, f"found {found!r} for '{name}', expected {one.type_name}")
         if not is_number(found):
             raise ModelError(
                 f"found the value of '{name}' to vary, expected what is known when the model is translated"
@@ -160,6 +161,19 @@ class Structure:
                 whole = tuple((name, ()) for name, _ in one.parts)
                 self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        here: Structure = self
+        for name, _ in reference.parts:
+            if not here.has(name):
+                break
+            one = here.members[name]
+            if one.primitive is not None:
+                return one.type_name
+            if not one.children:
+                break
+            here = one.children[0]
+        return ""
+
     def is_fixed(self, expression: Any) -> bool:
         return all(map(self._is_known, references(expression)))
 
@@ -176,25 +190,6 @@ class Structure:
                 break
             here = one.children[0]
         return True
-
-
-def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
-    """An expression and all that is in it; not the names of functions."""
-    if isinstance(expression, tree.Call):
-        yield expression
-        yield from nodes_of((expression.arguments, expression.named))
-    elif isinstance(expression, (tuple, list)):
-        for one in expression:
-            yield from nodes_of(one)
-    elif isinstance(expression, tree.TreeNode):
-        yield expression
-        for name in type(expression).__slots__:
-            yield from nodes_of(getattr(expression, name))
-
-
-def references(expression: Any) -> list[tree.ComponentReference]:
-    """The references in an expression, but for names of functions."""
-    return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
 
 
 @dataclass(eq=False)
@@ -265,6 +260,11 @@ class ClassMember:
     @property
     def kind(self) -> str:
         return "" if self.primitive is None else self.primitive.definition.name
+
+    @property
+    def type_name(self) -> str:
+        """Real, Integer, Boolean, String or the full name of an enumeration."""
+        return "" if self.primitive is None else self.primitive.name
 
     @cached_property
     def prefixes(self) -> set[str]:
@@ -350,7 +350,11 @@ class ClassMember:
                 f"found a component of {kind.name}, which is partial, expected a class that extends it",
             )
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        said = [self.full.of_element(k) for k in range(self.shape[0])] if self.shape else [self.full]
+        said = (
+            [self.full.of_element(k, self.shape[0]) for k in range(self.shape[0])]
+            if self.shape
+            else [self.full]
+        )
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
         around = self.owner
         while around is not None:
@@ -369,9 +373,3 @@ class ClassMember:
                 return around.members[self.name]
             around = around.around
         return None
-
-
-def plain(values: Mapping[str, Any]) -> Modifier:
-    """Modifications by plain values, nested as mappings."""
-    inner = {n: plain(v) if isinstance(v, Mapping) else Modifier(value=v) for n, v in values.items()}
-    return Modifier(inner=inner)

@@ -121,6 +121,11 @@ def size_words(value: Any) -> str:
     return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
 
 
+def sized(value: Any) -> str:
+    """The same, as a noun."""
+    return size_words(value).removeprefix("of ")
+
+
 def boxed(value: Any) -> Any:
     """A value as an array of NumPy, a scalar without dimensions; NumPy itself would take a symbol apart."""
     if isinstance(value, np.ndarray):
