@@ -261,6 +261,7 @@ class Parameter(Quantity):
     """
 
     kind = "parameter"
+    final = False  # in Modelica text: no other value may be given
 
     def __init__(
         self,

@@ -297,6 +297,18 @@ MEANINGS = (  # where a wrong model would run: text, line and column, words
         "6:7",
         "found 'p' modified, which is protected in A",
     ),
+    (
+        "model A\n  Real x = 1;\nend A;\nmodel B\n  Real z = 1;\nend B;\nmodel H\n  replaceable A a;\nend H;\nmodel M\n"
+        "  H h(redeclare B a);\nend M;",
+        "11:17",
+        "found B for what A constrains, but it has no 'x'",
+    ),
+    (
+        "connector U = input Real;\nconnector Y = output Boolean;\nmodel M\n  U u;\n  Y y = time > 1;\nequation\n"
+        "  connect(u, y);\nend M;",
+        "7:3",
+        "found connectors of Real and Boolean",
+    ),
 )
 
 
@@ -306,6 +318,18 @@ def test_wrong_text_is_refused_by_line_and_column(text, place, words, tmp_path):
     line, column = place.split(":")
     with pytest.raises(ModelError, match=f"line {line}, column {column}: {words}"):
         gantrytau.flatten(load_modelica(tmp_path / "wrong.mo")["M"]())
+
+
+def test_what_is_final_has_no_other_value_and_a_flow_meets_flows(tmp_path):
+    (tmp_path / "final.mo").write_text(
+        "connector P\n Real v;\n flow Real i;\nend P;\nconnector Q\n Real v;\n Real i;\nend Q;\nmodel M\n P p;\n Q q;\n"
+        "equation\n connect(p, q);\nend M;\nmodel F\n final parameter Real k = 1;\n Real x = k;\nend F;"
+    )
+    library = load_modelica(tmp_path / "final.mo")
+    with pytest.raises(ModelError, match="'i' is a flow in one of them only"):
+        gantrytau.flatten(library["M"]())
+    with pytest.raises(ModelError, match="'k', which is declared final"):
+        simulate(library["F"](), stop=1.0, parameters={"k": 2.0})
 
 
 def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):

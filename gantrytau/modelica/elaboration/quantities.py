@@ -50,7 +50,8 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
         for key in ("start", "fixed"):
             words.pop(key, None)
         fold = _flag(one, "Evaluate")
-        body[name] = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        body[name] = made = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        made.final = one.full.final
         return
     if held:
         start = words.pop("start", 0.0)

@@ -191,6 +191,29 @@ class ClassScope:
                 one.at, f"found {old.name} redeclared, expected a class that is declared 'replaceable'"
             )
 
+    def refuse_beyond(self, limit: "ClassScope", place: "ClassScope", at: int) -> None:
+        """TextError where this class lacks a public component of the class that constrains what may replace it."""
+        public = (name for name, one in limit.elements.items() if not one.protected)
+        missing = next((name for name in public if name not in self.elements), None)
+        if missing is not None:
+            place.refuse(
+                at,
+                f"found {self.name} for what {limit.name} constrains, but it has no '{missing}', expected a class with all "
+                f"components of {limit.name}",
+            )
+
+    def check_replaced(self) -> None:
+        """TextError for a redeclared class, here or in what it extends, that its constraint does not allow."""
+        plain = ClassScope(self.definition, self.source, self.around, more=self.more)
+        for name, new in self.replaced.items():
+            old = plain.inherited_class(name)
+            if old is not None and old.definition is not new.definition and old.around is not None:
+                constraint = old.definition.constraint
+                limit = old if constraint is None else old.around.find_class(constraint.type, constraint.at)
+                new.refuse_beyond(limit, new, new.definition.at)
+        for base, _ in self.bases:
+            base.check_replaced()
+
     @cached_property
     def elements(self) -> dict[str, Element]:
         """All components in the order of their declarations, inherited ones with their modifications."""

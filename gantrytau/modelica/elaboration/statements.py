@@ -160,6 +160,10 @@ def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[An
         a, b = reader.value(item.a), reader.value(item.b)
     except AbsentComponent:
         return
+    kinds = [type_of(one, reader) for one in (item.a, item.b)]
+    if kinds[0] != kinds[1]:
+        words = " and ".join(kind or "members" for kind in kinds)
+        raise ModelError(f"found connectors of {words}, expected connectors of one type")
     for one, other in _ends(a, b):
         yield connect(one, other)
 

@@ -128,6 +128,7 @@ class Structure:
 
     def prepare(self) -> None:
         """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""
+        self.scope.check_replaced()
         for one in self.members.values():
             one.full  # noqa: B018  (what is final is told here)
             if one.present and one.shape is not None:
@@ -222,7 +223,11 @@ class ClassMember:
     def plain_type(self) -> ClassScope:
         """Its class, without what is redeclared in it."""
         clause, scope = self.clause
-        return scope.find_class(clause.type, clause.at)
+        found, old = scope.find_class(clause.type, clause.at), self.element
+        if clause is not old.clause:
+            limit = old.clause.constraint or old.clause
+            found.refuse_beyond(old.scope.find_class(limit.type, limit.at), scope, clause.at)
+        return found
 
     @cached_property
     def own(self) -> Modifier:
