@@ -320,6 +320,35 @@ def test_wrong_text_is_refused_by_line_and_column(text, place, words, tmp_path):
         gantrytau.flatten(load_modelica(tmp_path / "wrong.mo")["M"]())
 
 
+PERIODS = """model M
+  Integer count;
+  Real begin;
+  Integer seen(start=0);
+initial algorithm
+  count := integer(time / 0.25);
+  begin := count * 0.25;
+equation
+  when time >= (pre(count) + 1) * 0.25 then
+    count = pre(count) + 1;
+    begin = time;
+  end when;
+  when {initial(), time > 0.4} then
+    seen = pre(seen) + 1;
+  end when;
+  annotation(experiment(StartTime=0.3, StopTime=1.1));
+end M;
+"""
+
+
+def test_initial_algorithms_and_whens_with_initial_act_at_the_start(tmp_path):
+    (tmp_path / "periods.mo").write_text(PERIODS)
+    found = simulate(load_modelica(tmp_path / "periods.mo")["M"]())
+    begun = [found.at(t, n) for t in (0.35, 0.6, 1.05) for n in ("count", "begin", "seen")]
+    np.testing.assert_allclose(
+        begun, [1, 0.25, 1, 2, 0.5, 2, 4, 1.0, 2], atol=1e-7
+    )  # of the instants' location
+
+
 def test_what_is_final_has_no_other_value_and_a_flow_meets_flows(tmp_path):
     (tmp_path / "final.mo").write_text(
         "connector P\n Real v;\n flow Real i;\nend P;\nconnector Q\n Real v;\n Real i;\nend Q;\nmodel M\n P p;\n Q q;\n"

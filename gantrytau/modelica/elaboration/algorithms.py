@@ -203,7 +203,7 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
 
 def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
     """The equations that an algorithm of a model amounts to: one for each variable that it assigns."""
-    names = dict.fromkeys(_assigned(items))
+    names = dict.fromkeys(assigned(items))
     run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
     run.run(items)
     for name, value in run.known.items():
@@ -215,15 +215,16 @@ def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
         yield ca.SX(left) == right
 
 
-def _assigned(items: Items) -> Iterator[str]:
+def assigned(items: Items) -> Iterator[str]:
+    """Names of the variables that statements set."""
     for item in items:
         if isinstance(item, tree.Assignment):
             yield from (target.parts[0][0] for target in item.targets if target is not None)
         elif isinstance(item, (tree.ForLoop, tree.WhileLoop)):
-            yield from _assigned(item.items)
+            yield from assigned(item.items)
         elif isinstance(item, tree.Branching):
             for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from _assigned(inner)
+                yield from assigned(inner)
 
 
 def called_class(

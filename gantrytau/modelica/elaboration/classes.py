@@ -1,19 +1,23 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import casadi as ca
+
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
+from gantrytau.language.events import WhenChain
 from gantrytau.language.model import Connector, Declared, Model, Outer
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
+from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
+    at_start,
     first_valued,
     remembers,
     sample_calls,
@@ -159,14 +163,14 @@ def _refuse_kind(structure: Structure) -> None:
     structure.scope.refuse(definition.at, f"found {found}")
 
 
-def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Modifier]]:
+def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Bound]]:
     """Names and values of the initial equations of what a `when` sets, as `pre(x) = 1` or `x = 1`."""
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
             if name in held and isinstance(item, tree.SimpleEquation):
                 structure.started.append(item)
-                yield name, Modifier(item.right, section.scope, at=item.at)
+                yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
 def _held(structure: Structure) -> Iterator[str]:
@@ -260,12 +264,28 @@ def experiment_of(structure: Structure) -> dict[str, float]:
 def _sections(instance: Any, initial: bool) -> Iterator[Any]:
     """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
-    for section in structure.scope.sections:
-        if section.kind.startswith("initial") != initial:
+    held, firsts = set(_held(structure)), []
+    for section in sorted(structure.scope.sections, key=lambda one: one.kind != "initial algorithm"):
+        sets_held = section.kind == "initial algorithm" and held.issuperset(assigned(section.items))
+        if (section.kind.startswith("initial") and not sets_held) != initial:
             continue
         read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
         items = [one for one in section.items if not any(one is other for other in structure.started)]
         try:
-            yield from read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
+            found = read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
+            if sets_held:
+                firsts += found
+            else:
+                yield from (_begun(one, firsts) for one in found)
         except AbsentComponent as error:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None
+
+
+def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
+    """A statement; a chain of `when` also gives what it sets the values of initial algorithms."""
+    if not isinstance(stated, WhenChain) or not firsts:
+        return stated
+    actions = (action for one in stated.branches for action in one.actions if isinstance(action, ca.SX))
+    names = {action.dep(0).name() for action in actions if action.dep(0).is_symbolic()}
+    own = tuple(one for one in firsts if one.dep(0).name() in names)
+    return WhenChain((at_start(own), *stated.branches)) if own else stated

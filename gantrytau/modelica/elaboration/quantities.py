@@ -29,7 +29,7 @@ TEXTS = {"unit": "unit", "displayUnit": "display"}
 IGNORED = {"quantity", "unbounded"}
 
 
-def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Modifier | None) -> None:
+def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bound | None) -> None:
     """The declaration of a number, Boolean, text or enumeration; nothing for a constant that is no plain value."""
     name, structure = one.name, one.owner
     if one.is_folded:
@@ -55,11 +55,12 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
         return
     if held:
         start = words.pop("start", 0.0)
-        start = Bound(before, structure) if before is not None else start
+        start = before or start
         words.pop("fixed", None)
         body[name] = Discrete(start, shape=one.shape, **words)
         return
-    kind = next((made for word, made in KINDS.items() if word in one.prefixes), Real)
+    words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
+    kind = next((made for word, made in KINDS.items() if word in words_of), Real)
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]

@@ -237,18 +237,22 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
 def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
     for test, items in item.branches:
         conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-        if any(_is_call(one, "initial") for one in conditions):
-            raise ModelError(
-                "found initial() in 'when', which is not supported, expected an initial equation beside it"
-            )
         actions = tuple(_actions(items, reader))
         for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
+            if _is_call(one, "initial"):
+                yield at_start(actions)
+                continue
             edge = cast(tree.Call, one).arguments[0] if _is_call(one, "edge") else one
             found = values.condition(reader.value(edge))
             if isinstance(found, ca.SX):
                 refuse_change(found)
             sampled = any(sample_calls(one))
             yield Happening(found, actions, "sample" if sampled else "", sampled)
+
+
+def at_start(actions: tuple[Any, ...]) -> Happening:
+    """What happens at the start and never again: a condition on the time that always holds."""
+    return Happening(time > -1e30, actions, "at the start", True)
 
 
 def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
