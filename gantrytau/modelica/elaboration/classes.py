@@ -10,6 +10,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
 from gantrytau.language.events import WhenChain
 from gantrytau.language.model import Connector, Declared, Model, Outer
+from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
@@ -70,6 +71,9 @@ class ModelicaModel(TextClass, Model):
 
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
+        for name, one in self.structure.members.items():
+            if one.present and one.is_solved and 0 not in one.shape:
+                yield der(getattr(self, name)) == 0
 
     def initial_equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=True)

@@ -285,7 +285,15 @@ class ClassMember:
 
     @property
     def is_parameter(self) -> bool:
-        return bool({"parameter", "constant"} & self.prefixes) or self.kind == "String"
+        stated = bool({"parameter", "constant"} & self.prefixes) and not self.is_solved
+        return stated or self.kind == "String"
+
+    @cached_property
+    def is_solved(self) -> bool:
+        """Whether it is a parameter whose value initial equations determine: `fixed = false`."""
+        fixed = self.full.inner.get("fixed")
+        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
+        return free and "parameter" in self.prefixes and self.full.value is None
 
     @property
     def is_folded(self) -> bool:
