@@ -206,6 +206,35 @@ def test_each_condition_of_a_vector_acts_and_a_run_has_the_times_of_the_experime
     assert found.final("y").tolist() == [1.0, 1.0]
 
 
+TOGETHER = """model M
+  Boolean b = time > 0.25;
+  Integer n(start=0), few(start=0), many(start=0), edges(start=0), before(start=0);
+equation
+  when sample(0.1, 0.1) then
+    n = pre(n) + 1;
+  end when;
+  when sample(0.1, 0.1) and n < 3 then
+    few = pre(few) + 1;
+  end when;
+  when n > 2 and sample(0.1, 0.1) then
+    many = pre(many) + 1;
+  end when;
+  when edge(b) and n > 5 then
+    edges = pre(edges) + 1;
+  end when;
+  when time > 0.25 then
+    before = if pre(b) then 1 else 2;
+  end when;
+end M;
+"""
+
+
+def test_what_stands_beside_an_instant_has_the_new_values_and_pre_the_old_ones(tmp_path):
+    (tmp_path / "together.mo").write_text(TOGETHER)
+    found = simulate(load_modelica(tmp_path / "together.mo")["M"](), stop=0.55)
+    assert [found.final(n) for n in ("n", "few", "many", "edges", "before")] == [5, 2, 3, 0, 2]
+
+
 PERIODS = """model M
   Integer count;
   Real begin;

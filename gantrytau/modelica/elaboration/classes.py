@@ -16,15 +16,18 @@ from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algori
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
+from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     at_start,
     first_valued,
+    instants,
     remembers,
     sample_calls,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.references import nodes_of
 
 CLASSES = ("model", "block", "connector", "record", "class")
 TAKEN = {
@@ -179,11 +182,12 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
 
 def _held(structure: Structure) -> Iterator[str]:
     """Names of what a `when` sets."""
-    for section in structure.scope.sections:
-        switches = [item for item in section.items if section.kind == "equation" and remembers(item)]
-        yield from (
-            item.left.parts[0][0] for item in switches if isinstance(item.left, tree.ComponentReference)
-        )
+    asked = _asked_before(structure)
+    for section in _all_sections(structure):
+        for item in section.items if section.kind == "equation" else ():
+            left = item.left if isinstance(item, tree.SimpleEquation) else None
+            if isinstance(left, tree.ComponentReference) and (remembers(item) or left.parts[0][0] in asked):
+                yield left.parts[0][0]
     for item in _whens(structure):
         for _, items in item.branches:
             left = list(items)
@@ -195,6 +199,30 @@ def _held(structure: Structure) -> Iterator[str]:
                     for each in target.items if isinstance(target, tree.OutputList) else (target,):
                         if isinstance(each, tree.ComponentReference):
                             yield each.parts[0][0]
+
+
+def _asked_before(structure: Structure) -> set[str]:
+    """Names of the Booleans whose values before an instant are asked for."""
+    tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
+    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in ("pre", "edge", "change")]
+    names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
+    known = (structure.members.get(name) for name in names)
+    return {
+        one.name for one in known if one and one.kind == "Boolean" and not one.is_parameter and not one.shape
+    }
+
+
+def _all_sections(structure: Structure) -> Iterator[StatementSection]:
+    """The sections of a class, and an equation for each value of a Boolean that is asked for before an instant."""
+    yield from structure.scope.sections
+    for one in map(structure.members.__getitem__, sorted(_asked_before(structure))):
+        said = one.own
+        if said.value is not None and one.over.value is None:
+            name = tree.ComponentReference(said.at, ((one.name, ()),))
+            found = tree.SimpleEquation(said.at, None, None, "=", name, said.value)
+            yield StatementSection("equation", (found,), said.scope)
 
 
 def _whens(structure: Structure) -> Iterator[tree.Branching]:
@@ -269,7 +297,7 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
     """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
     held, firsts = set(_held(structure)), []
-    for section in sorted(structure.scope.sections, key=lambda one: one.kind != "initial algorithm"):
+    for section in sorted(_all_sections(structure), key=lambda one: one.kind != "initial algorithm"):
         sets_held = section.kind == "initial algorithm" and held.issuperset(assigned(section.items))
         if (section.kind.startswith("initial") and not sets_held) != initial:
             continue

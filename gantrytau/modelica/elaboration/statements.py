@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.events import Happening, WhenChain, refuse_change, reinit, terminate
+from gantrytau.language.declarations import Discrete
+from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
 from gantrytau.language.functions import floor, if_else, logic_not
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
@@ -38,7 +39,7 @@ def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
 
 
 def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
-    if remembers(item):
+    if remembers(item) or _is_discrete(item, reader):
         for left, right in sides(item, reader):
             off = Happening(logic_not(right), (left == 0,), initially=True)
             yield WhenChain((Happening(right, (left == 1,), initially=True), off))
@@ -92,6 +93,13 @@ def remembers(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
         return False
     names = (call.function.parts[0][0] for call in nodes_of(item.right) if isinstance(call, tree.Call))
     return any(name in ("pre", "edge", "change") for name in names)
+
+
+def _is_discrete(item: Any, reader: Interpreter) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation of what is held between instants, as a Boolean whose `pre` is asked for."""
+    left = item.left if isinstance(item, tree.SimpleEquation) else None
+    members = type(cast(Any, reader.members).instance).members()
+    return isinstance(left, tree.ComponentReference) and isinstance(members.get(left.parts[0][0]), Discrete)
 
 
 def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
@@ -238,6 +246,12 @@ def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
     for test, items in item.branches:
         conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
         actions = tuple(_actions(items, reader))
+        if len(item.branches) == 1:
+            test, rest = _instant_and_rest(test)
+            conditions = (test,) if rest is not None else conditions
+            actions = (
+                tuple(_guarded(one, reader.value(rest)) for one in actions) if rest is not None else actions
+            )
         for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
             if _is_call(one, "initial"):
                 yield at_start(actions)
@@ -248,6 +262,32 @@ def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
                 refuse_change(found)
             sampled = any(sample_calls(one))
             yield Happening(found, actions, "sample" if sampled else "", sampled)
+
+
+def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
+    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
+    conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
+    return tuple(_instant_and_rest(one)[0] for one in conditions)
+
+
+def _instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
+    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
+    if isinstance(test, tree.Binary) and test.operator == "and":
+        for one, other in ((test.left, test.right), (test.right, test.left)):
+            if _is_call(one, "sample") or _is_call(one, "edge"):
+                return one, other
+    return test, None
+
+
+def _guarded(action: Any, test: Any) -> Any:
+    """An action where a condition holds with the new values of what changes at the instant, else none."""
+    test = values.condition(test)
+    if isinstance(action, Reinit):
+        return reinit(action.variable, if_else(test, action.value, action.variable))
+    if not isinstance(action, ca.SX):
+        raise ModelError("found terminate() beside sample() and another condition, expected another when")
+    left = action.dep(0)
+    return left == if_else(test, action.dep(1), pre(left))
 
 
 def at_start(actions: tuple[Any, ...]) -> Happening:
