@@ -206,6 +206,75 @@ def test_each_condition_of_a_vector_acts_and_a_run_has_the_times_of_the_experime
     assert found.final("y").tolist() == [1.0, 1.0]
 
 
+STICKING = """model M "unit mass on dry friction of 2 N, pushed by 3 N behind 2 s"
+  Real v(start=1, fixed=true), a, sa, f;
+  Integer mode(min=0, max=1, start=0);
+  Boolean forward, locked;
+equation
+  der(v) = a;
+  a = (if time > 2 then 3 else 0) - f;
+  forward = pre(mode) == 0 and (sa > 2 or pre(forward) and sa > 2) or initial() and v > 0;
+  locked = not (pre(mode) == 1 or forward);
+  a = if locked then 0 else sa - 2;
+  f = if locked then sa else 2;
+  mode = if (pre(mode) == 1 or forward) and v > 0 then 1 else 0;
+end M;
+"""
+
+
+def test_friction_by_a_mode_that_remembers_sticks_and_breaks_away(tmp_path):
+    (tmp_path / "sticking.mo").write_text(STICKING)
+    found = simulate(load_modelica(tmp_path / "sticking.mo")["M"](), stop=3.0)
+    np.testing.assert_allclose(found.at(np.array([0.25, 1.0, 1.9, 3.0]), "v"), [0.5, 0, 0, 1], atol=1e-6)
+
+
+TABLE = """type Smoothness = enumeration(LinearSegments, ConstantSegments);
+type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic);
+class Held
+  extends ExternalObject;
+  function constructor
+    input String tableName;
+    input String fileName;
+    input Real table[:, :];
+    input Integer columns[:];
+    input Smoothness smoothness;
+    input Extrapolation extrapolation;
+    output Held held;
+    external "C" held = ModelicaStandardTables_CombiTable1D_init3(fileName, tableName, table);
+  end constructor;
+end Held;
+function value
+  input Held held;
+  input Integer column;
+  input Real u;
+  output Real y;
+  external "C" y = ModelicaStandardTables_CombiTable1D_getValue(held, column, u);
+end value;
+model M
+  parameter Real numbers[:, :] = {{0, 0, 5}, {1, 2, 6}, {1, 4, 7}, {2, 4, 8}};
+  parameter Smoothness smoothness = Smoothness.LinearSegments;
+  parameter Extrapolation beyond = Extrapolation.HoldLastPoint;
+  parameter Held held = Held("NoName", "NoName", numbers, {2, 3}, smoothness, beyond);
+  Real y = value(held, 1, time);
+end M;
+"""
+
+
+@pytest.mark.parametrize(
+    ("smoothness", "beyond", "wanted"),
+    [
+        ("LinearSegments", "HoldLastPoint", [1, 4, 4, 4]),
+        ("ConstantSegments", "HoldLastPoint", [0, 4, 4, 4]),
+        ("LinearSegments", "Periodic", [1, 4, 1, 4]),
+    ],
+)
+def test_tables_are_read_by_external_functions(smoothness, beyond, wanted, tmp_path):
+    (tmp_path / "table.mo").write_text(TABLE)
+    model = load_modelica(tmp_path / "table.mo")["M"](smoothness=smoothness, beyond=beyond)
+    found = simulate(model, stop=4.0)
+    np.testing.assert_allclose(found.at(np.array([0.5, 1.5, 2.5, 3.5]), "y"), wanted, atol=1e-9)
+
+
 TOGETHER = """model M
   Boolean b = time > 0.25;
   Integer n(start=0), few(start=0), many(start=0), edges(start=0), before(start=0);

@@ -11,25 +11,25 @@ WRONG = (  # text of a model, line and column, words
     (
         "model M\n  Real x(strat=1) = 1;\nend M;",
         "2:10",
-        "found 'strat', which Real does not have; did you mean 'start'",
+        "found 'strat', unknown to Real; did you mean 'start'",
     ),
     (
         "model A\n  Real x = 1;\nend A;\nmodel M\n  A a(y=2);\nend M;",
         "5:7",
-        "found 'y' modified, which A does not have",
+        "found 'y' modified, which A lacks",
     ),
     ("model A\n  final parameter Real x = 1;\nend A;\nmodel M\n  A a(x=2);\nend M;", "5:7", ".*'final'"),
     (
         "model M\n  Real x[3] = {1, 2, 3} + {1, 2};\nend M;",
         "2:15",
-        "found the sizes \\[3\\] and \\[2\\] beside '\\+'",
+        "found sizes \\[3\\] and \\[2\\] beside '\\+'",
     ),
     (
         "model M\n  Real x[3] = {1, 2, 3};\n  Real y = x[4];\nend M;",
         "3:12",
         "found the index 4, expected 1 to 3",
     ),
-    ("model M\n  extends M;\nend M;", "1:7", "found M among the classes that it extends, expected no circle"),
+    ("model M\n  extends M;\nend M;", "1:7", "found M among its own bases, expected no circle"),
     (
         "model M\n  Real x;\nequation\n  x = inStream(x);\nend M;",
         "4:7",

@@ -15,6 +15,7 @@ from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import Items, looped
 from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.table_functions import external_value
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -67,9 +68,7 @@ class Execution:
         value = reader.results(item.value)
         found = value if isinstance(value, tuple) else (value,)
         if len(item.targets) > len(found):
-            reader.scope.refuse(
-                item.at, f"found {len(item.targets)} names to assign to, expected at most {len(found)}"
-            )
+            reader.scope.refuse(item.at, f"found {len(item.targets)} names to assign, expected {len(found)}")
         for target, one in zip(item.targets, found, strict=False):
             if target is not None:
                 name = target.parts[0][0]
@@ -138,9 +137,7 @@ class Execution:
                 if str(left) == "return":
                     raise
                 return
-        self.reader.scope.refuse(
-            item.at, f"found a loop of more than {MOST_ROUNDS} rounds, expected one that ends"
-        )
+        self.reader.scope.refuse(item.at, f"found a loop of {MOST_ROUNDS} rounds, expected one that ends")
 
     def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
         """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
@@ -184,17 +181,13 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
         return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
     if rest or not isinstance(old, np.ndarray):
-        raise ModelError(
-            "found an element of what is no array of a known size assigned, expected an array of numbers"
-        )
+        raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()
     places = tuple(reader.places(one, size) for one, size in zip(subscripts, old.shape, strict=True))
     many = [place if isinstance(place, list) else [place] for place in places]
     shape = tuple(len(place) for place in places if isinstance(place, list))
     if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
-        raise ModelError(
-            f"found the size {values.size_words(new)} assigned to {list(shape)}, expected one size"
-        )
+        raise ModelError(f"found {values.size_words(new)} assigned to {list(shape)}, expected one size")
     flat = iter(new.flat) if isinstance(new, np.ndarray) else iter([new])
     for index in np.ndindex(*map(len, many)):
         found[tuple(axis[k] for axis, k in zip(many, index, strict=True))] = next(flat)
@@ -210,7 +203,7 @@ def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
         left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
         if right is None:
             raise ModelError(
-                f"found '{name}' without a value at the end of an algorithm, expected one in each branch"
+                f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
         yield ca.SX(left) == right
 
@@ -236,15 +229,14 @@ def called_class(
 ) -> Any:
     """The value of a function, several as a tuple, or of the constructor of a record."""
     definition = scope.definition
-    record = definition.kind == "record"
+    if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
+        scope = made
+    record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
     external = definition.body.external if isinstance(definition.body, tree.Composition) else None
-    if external is not None and external.language != "builtin":
-        raise ModelError(
-            f"found {scope.name}, an external function, which is not supported; write an algorithm"
-        )
-    inputs = {n: e for n, e in scope.elements.items() if record or "input" in e.clause.prefixes}
+    whole = definition.kind == "record"
+    inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
     mapped = next((n for n, one in given.items() if not record and _is_longer(inputs[n], one)), None)
     if mapped is not None:
@@ -253,15 +245,20 @@ def called_class(
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, constants) for one in all_given]
         return values.array(each)
-    if external is not None:
+    if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
     run = Execution(Interpreter(scope, constants, beyond), {})
-    for name, element in scope.elements.items():
+    for name, element in (scope.elements if external is None and not record else inputs).items():
         run.declare(
             name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
         )
     if record:
         return RecordValue(run.known)
+    if external is not None:
+        reader = replace(run.reader, local=run.known)
+        return external_value(
+            external.function or definition.name, [reader.value(e) for e in external.arguments]
+        )
     try:
         for section in scope.sections:
             run.reader = replace(run.reader, scope=section.scope)
@@ -306,9 +303,7 @@ def _given(
     found = dict(zip(inputs, arguments, strict=False))
     for name, one in named.items():
         if name not in inputs:
-            raise ModelError(
-                f"found the argument '{name}', which {scope.name} does not have{did_you_mean(name, inputs)}"
-            )
+            raise ModelError(f"found '{name}', which {scope.name} does not take{did_you_mean(name, inputs)}")
         if name in found:
             raise ModelError(f"found two values for '{name}' of {scope.name}, expected one")
         found[name] = one

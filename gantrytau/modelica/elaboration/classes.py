@@ -14,10 +14,11 @@ from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
-from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.placed import AT_START, Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
+    BEFORE,
     AbsentComponent,
     at_start,
     first_valued,
@@ -30,16 +31,18 @@ from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.references import nodes_of
 
 CLASSES = ("model", "block", "connector", "record", "class")
-TAKEN = {
-    "equations",
-    "initial_equations",
-    "members",
-    "modified",
-    "modifications",
-    "chosen_starts",
-    "shaped",
-    "structure",
-}
+TAKEN = frozenset(
+    [
+        "equations",
+        "initial_equations",
+        "members",
+        "modified",
+        "modifications",
+        "chosen_starts",
+        "shaped",
+        "structure",
+    ]
+)
 
 
 class TextClass(Declared):
@@ -74,6 +77,8 @@ class ModelicaModel(TextClass, Model):
 
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
+        if AT_START in type(self).members():
+            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
                 yield der(getattr(self, name)) == 0
@@ -94,9 +99,7 @@ def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str
         if one is None or not one.present:
             continue
         if one.own.final:
-            raise ModelError(
-                f"{structure.scope.name}: found a modification of '{name}', which is final, expected none"
-            )
+            raise ModelError(f"{structure.scope.name}: found '{name}' modified, which is final")
         value = given if isinstance(given, Mapping) else getattr(given, "value", given)
         if one.primitive is not None and one.is_folded:
             if isinstance(value, (bool, int, float, str)) and value != _known(one):
@@ -128,7 +131,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
                 one.element.declaration.at,
                 f"found a component '{name}', a name that is taken, expected another name",
             )
-        if not one.present:
+        if not one.present or one.is_object:
             body[name] = None
         elif "outer" in one.prefixes and "inner" not in one.prefixes:
             body[name] = Outer(Declared, name)
@@ -142,11 +145,21 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         body[sample_name(call)] = Discrete(
             Bound(start, structure), unit="s", description="next instant of sample()"
         )
+    if _asks_for_start(structure):
+        body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
         return type(scope.definition.name, (base or ModelicaConnector,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)
     return type(scope.definition.name, (base or ModelicaModel,), body)
+
+
+def _asks_for_start(structure: Structure) -> bool:
+    """Whether `initial()` stands elsewhere than alone as a condition of `when`."""
+    alone = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    nodes = (node for section in structure.scope.sections for node in nodes_of(section.items))
+    calls = (one for one in nodes if isinstance(one, tree.Call) and id(one) not in alone)
+    return any(one.function.parts[0][0] == "initial" for one in calls)
 
 
 def _is_connector(structure: Structure) -> bool:
@@ -163,7 +176,7 @@ def _refuse_kind(structure: Structure) -> None:
         found = "an expandable connector, which is not supported, expected one with declared members"
     elif streams:
         found = f"the stream variable '{streams[0]}', which is not supported, expected potentials and flows"
-    elif any(base.definition.name == "ExternalObject" for base, _ in structure.scope.bases):
+    elif structure.scope.is_external_object:
         found = f"{name}, an external object, which is not supported, expected equations"
     else:
         return
@@ -186,7 +199,9 @@ def _held(structure: Structure) -> Iterator[str]:
     for section in _all_sections(structure):
         for item in section.items if section.kind == "equation" else ():
             left = item.left if isinstance(item, tree.SimpleEquation) else None
-            if isinstance(left, tree.ComponentReference) and (remembers(item) or left.parts[0][0] in asked):
+            if isinstance(left, tree.ComponentReference) and (
+                remembers(item, structure) or left.parts[0][0] in asked
+            ):
                 yield left.parts[0][0]
     for item in _whens(structure):
         for _, items in item.branches:
@@ -206,7 +221,7 @@ def _asked_before(structure: Structure) -> set[str]:
     tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
     calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
-    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in ("pre", "edge", "change")]
+    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in BEFORE]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
     known = (structure.members.get(name) for name in names)
     return {

@@ -27,10 +27,7 @@ class ModelicaLibrary:
     """Classes of Modelica text: `library["Package.Model"]` is a class as any other Model; keywords modify it."""
 
     def __init__(self, paths: Sequence[Path], libraries: Sequence[Path]):
-        top = tree.ClassDefinition(
-            0, None, None, (), "package", "", tree.Composition(0, False, None, (), None), None
-        )
-        self.root = ClassScope(top, SourceText("Modelica", ""), None)
+        self.root = ClassScope(_empty_package(""), SourceText("Modelica", ""), None)
         predefined = parse(SourceText("Modelica", PREDEFINED))
         for one in predefined.classes:
             made = ClassScope(one, predefined.source, self.root, predefined=one.kind == "type")
@@ -56,9 +53,7 @@ class ModelicaLibrary:
         for one in found:
             around = one.around or self.root
             if one.definition.name in around.classes:
-                one.refuse(
-                    one.definition.at, f"found a second class {one.name}, expected one; leave one file out"
-                )
+                one.refuse(one.definition.at, f"found a second class {one.name}, expected one")
             around.classes[one.definition.name] = one
         return [one.name for one in found]
 
@@ -88,7 +83,7 @@ class ModelicaLibrary:
                 raise ModelError(f"found the name '{name}', expected a class{did_you_mean(name, self.names)}")
             if "partial" in scope.definition.prefixes:
                 scope.refuse(
-                    scope.definition.at, f"found {name}, which is partial, expected a class that extends it"
+                    scope.definition.at, f"found {name}, which is partial, expected one that extends it"
                 )
             structure = Structure(scope, NOTHING, self)
             structure.prepare()
@@ -134,6 +129,11 @@ def load_modelica(
     )
 
 
+def _empty_package(name: str) -> tree.ClassDefinition:
+    body = tree.Composition(0, False, None, (), None)
+    return tree.ClassDefinition(0, None, None, (), "package", name, body, None)
+
+
 def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     """The classes of a file, within the package that it names if that is there."""
     found = read_tree(path)
@@ -141,10 +141,7 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     for part in (found.within or "").split(".") if found.within else ():
         inner = around.own_class(part)
         if inner is None:  # the package itself is not given
-            name = tree.ClassDefinition(
-                0, None, None, (), "package", part, tree.Composition(0, False, None, (), None), None
-            )
-            inner = around.classes[part] = ClassScope(name, found.source, around)
+            inner = around.classes[part] = ClassScope(_empty_package(part), found.source, around)
         around = inner
     return [ClassScope(one, found.source, around) for one in found.classes]
 

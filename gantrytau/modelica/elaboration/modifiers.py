@@ -144,9 +144,7 @@ def merged(above: Modifier, below: Modifier) -> Modifier:
     if below is NOTHING:
         return above
     if below.final and (above.value is not None or above.redeclared or above.inner):
-        above.scope.refuse(
-            above.at, "found a modification of what is declared 'final', expected none; leave it out"
-        )
+        above.scope.refuse(above.at, "found a modification of what is declared 'final', expected none")
     inner = dict(below.inner)
     for name, one in above.inner.items():
         inner[name] = merged(one, inner[name]) if name in inner else one

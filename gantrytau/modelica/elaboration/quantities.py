@@ -107,7 +107,7 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
         else:
             known = (*NUMBERS, *TEXTS, "fixed", "stateSelect", "quantity")
             attribute.scope.refuse(
-                attribute.at, f"found '{name}', which {one.kind} does not have{did_you_mean(name, known)}"
+                attribute.at, f"found '{name}', unknown to {one.kind}{did_you_mean(name, known)}"
             )
     if not _has_dimension(found.get("unit", "")):
         found.pop("unit", None)

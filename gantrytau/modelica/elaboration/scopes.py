@@ -113,9 +113,7 @@ class ClassScope:
         for clause, protected in clauses:
             for one in clause.components:
                 if one.name in found:
-                    self.refuse(
-                        one.at, f"found a second component '{one.name}' of {self.name}, expected another name"
-                    )
+                    self.refuse(one.at, f"found a second component '{one.name}' of {self.name}, expected one")
                 found[one.name] = Element(
                     clause,
                     one,
@@ -129,9 +127,7 @@ class ClassScope:
     def bases(self) -> tuple[tuple["ClassScope", Modifier], ...]:
         """The classes that it extends, with the modifications of each."""
         if self.busy:
-            self.refuse(
-                self.definition.at, f"found {self.name} among the classes that it extends, expected no circle"
-            )
+            self.refuse(self.definition.at, f"found {self.name} among its own bases, expected no circle")
         self.busy = True
         try:
             found = tuple(self._inherited())
@@ -187,9 +183,7 @@ class ClassScope:
                 f"found '{name}' redeclared, expected a class of {self.name}{did_you_mean(name, self.names())}",
             )
         if not {"replaceable", "redeclare"} & set(old.definition.prefixes):
-            scope.refuse(
-                one.at, f"found {old.name} redeclared, expected a class that is declared 'replaceable'"
-            )
+            scope.refuse(one.at, f"found {old.name} redeclared, expected a class declared 'replaceable'")
 
     def refuse_beyond(self, limit: "ClassScope", place: "ClassScope", at: int) -> None:
         """TextError where this class lacks a public component of the class that constrains what may replace it."""
@@ -264,6 +258,10 @@ class ClassScope:
         if self.predefined or isinstance(self.definition.body, tree.Enumeration):
             return True
         return len(self.bases) == 1 and self.bases[0][0].is_primitive and not self.declared
+
+    @cached_property
+    def is_external_object(self) -> bool:
+        return any(base.definition.name == "ExternalObject" for base, _ in self.bases)
 
     @cached_property
     def sections(self) -> tuple[StatementSection, ...]:

@@ -1,6 +1,7 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, TypeGuard, cast
 
 import casadi as ca
@@ -9,7 +10,7 @@ import numpy as np
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete
 from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_not
+from gantrytau.language.functions import floor, if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
@@ -20,6 +21,7 @@ from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.references import nodes_of
 
 ROUNDING = 1e-6  # of a period, by which an instant may be located early
+BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
 
 
@@ -39,12 +41,12 @@ def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
 
 
 def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
-    if remembers(item) or _is_discrete(item, reader):
+    if remembers(item, reader.members) or _is_discrete(item, reader):
         for left, right in sides(item, reader):
-            off = Happening(logic_not(right), (left == 0,), initially=True)
-            yield WhenChain((Happening(right, (left == 1,), initially=True), off))
+            yield WhenChain(tuple(_followed(left, right, reader.members.limits(cast(Any, item.left)))))
     elif isinstance(item, tree.SimpleEquation):
         _check_types(item, reader)
+        reader = replace(reader, settled=True) if _asks_before(item) else reader
         for left, right in sides(item, reader):
             yield left == right
     elif isinstance(item, tree.ConnectEquation):
@@ -79,6 +81,17 @@ def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool 
         check_type(left, item.right, reader, f"the right side of an equation of {left}", item.right.at)
 
 
+def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iterator[Happening]:
+    """What makes a Boolean, or an Integer between limits, follow an expression that asks for values before."""
+    if limits is None:
+        right = values.condition(right)
+        yield Happening(right, (left == 1,), initially=True)
+        yield Happening(logic_not(right), (left == 0,), initially=True)
+        return
+    for value in range(limits[0], limits[1] + 1):
+        yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
+
+
 def first_valued(item: tree.EquationOrStatement) -> str:
     """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
     left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
@@ -87,12 +100,23 @@ def first_valued(item: tree.EquationOrStatement) -> str:
     return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
 
 
-def remembers(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
-    """Whether it is an equation outside of `when` that asks for values before, as a switch with hysteresis does."""
-    if not isinstance(item, tree.SimpleEquation) or not isinstance(item.left, tree.ComponentReference):
+def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation of a Boolean or Integer outside of `when` that compares values beside instants."""
+    if not _asks_before(item) or not isinstance(item.left, tree.ComponentReference):
         return False
-    names = (call.function.parts[0][0] for call in nodes_of(item.right) if isinstance(call, tree.Call))
-    return any(name in ("pre", "edge", "change") for name in names)
+    calls = [one for one in nodes_of(item.right) if isinstance(one, tree.Call) and one.arguments]
+    asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
+    inside = {id(one) for one in asked}
+    others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
+    jumps = any(one.function.parts[0][0] in ("edge", "change") for one in calls)
+    return members.type_of(item.left) in ("Boolean", "Integer") and bool(
+        jumps or others or item.left in asked
+    )
+
+
+def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
+    names = (call.function.parts[0][0] for call in nodes_of(item) if isinstance(call, tree.Call))
+    return isinstance(item, tree.SimpleEquation) and any(name in BEFORE for name in names)
 
 
 def _is_discrete(item: Any, reader: Interpreter) -> TypeGuard[tree.SimpleEquation]:
@@ -116,7 +140,7 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
     if isinstance(item.left, tree.OutputList):
         if not isinstance(right, tuple):
             raise ModelError(
-                "found one value right of a list of outputs, expected a function with several results"
+                "found one value beside a list of outputs, expected a function of several results"
             )
         if len(item.left.items) > len(right):
             raise ModelError(f"found {len(item.left.items)} outputs, expected at most {len(right)}")
@@ -139,16 +163,14 @@ def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         return
     if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
         raise ModelError(
-            f"found the sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
+            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
         )
     if isinstance(a, np.ndarray) and not a.size:
         return
     left, right = values.to_casadi(a), values.to_casadi(b)
     if not isinstance(left, ca.SX) and not isinstance(right, ca.SX):
         if not np.allclose(np.array(left, float), np.array(right, float), rtol=0, atol=0):
-            raise ModelError(
-                f"found {left} = {right}, which never holds, expected an equation with a variable"
-            )
+            raise ModelError(f"found {left} = {right}, which never holds, expected an equation of a variable")
         return
     left, right = ca.SX(left), ca.SX(right)
     if any(one.numel() > 1 and len(set(map(hash, one.elements()))) == 1 for one in (left, right)):
@@ -216,7 +238,7 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     for one in stated(items, reader):
         if not isinstance(one, ca.SX):
             raise ModelError(
-                "found connect, when or assert where the condition of 'if' varies, expected equations only"
+                "found connect, when or assert under a condition that varies, expected equations"
             )
         found += [e.dep(0) - e.dep(1) for e in one.elements()]
     return found
@@ -327,5 +349,5 @@ def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
             yield terminate(reader.value(item.call.arguments[0]))
         else:
             reader.scope.refuse(
-                item.at, "found what is no equation, reinit or terminate in 'when', expected one of these"
+                item.at, "found another statement in 'when', expected an equation, reinit or terminate"
             )

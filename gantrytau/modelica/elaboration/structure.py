@@ -25,7 +25,7 @@ class Structure:
     """An instance of a class: modifier says what is said of it from outside, whose values know their own instances.
 
     read: names of the parameters that shape it; folding: those whose values are asked for at the moment;
-    started: initial equations that are start values of what a `when` sets.
+    started: initial equations that are start values of what a `when` sets; objects: values of external objects by name.
     """
 
     scope: ClassScope
@@ -37,6 +37,7 @@ class Structure:
     read: set[str] = field(default_factory=set)
     folding: list[str] = field(default_factory=list)
     started: list[Any] = field(default_factory=list)
+    objects: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def members(self) -> dict[str, "ClassMember"]:
@@ -45,9 +46,7 @@ class Structure:
             redeclares_class = one.redeclared is not None and one.member_clause is None
             if name not in self.scope.elements and not redeclares_class and one.scope is not None:
                 hint = did_you_mean(name, self.scope.elements)
-                one.scope.refuse(
-                    one.at, f"found '{name}' modified, which {self.scope.name} does not have{hint}"
-                )
+                one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
                 one.scope.refuse(
@@ -67,7 +66,7 @@ class Structure:
         return self.members[name].shape
 
     def next_sample(self, call: tree.Call) -> Any:
-        raise ModelError("found sample() outside of a condition of 'when', expected it there")
+        raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
@@ -89,12 +88,12 @@ class Structure:
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
         one = self.members[name]
+        if one.is_object and name not in self.objects:
+            self.objects[name] = self.folded(one.full)
         if one.primitive is None:
-            return one.children if one.shape else one.children[0]
+            return self.objects[name] if one.is_object else one.children if one.shape else one.children[0]
         if not one.is_parameter:
-            raise ModelError(
-                f"found '{name}', a variable, expected what is known when the model is translated"
-            )
+            raise ModelError(f"found the variable '{name}', expected what is known at translation")
         if one.full.value is None:
             raise ModelError(
                 f"found '{name}', which has no value, expected one, as it shapes {self.scope.name}; give {name} = ..."
@@ -115,23 +114,19 @@ class Structure:
         if not fits(one.type_name, type_of_value(found)):
             raise self._refused(one.full, f"found {found!r} for '{name}', expected {one.type_name}")
         if not is_number(found):
-            raise ModelError(
-                f"found the value of '{name}' to vary, expected what is known when the model is translated"
-            )
-        if one.kind == "Real" and isinstance(found, int) and not isinstance(found, bool):
-            return float(found)
-        return (
-            int(found)
-            if one.kind == "Integer" and isinstance(found, float) and found == int(found)
-            else found
-        )
+            raise ModelError(f"found the value of '{name}' to vary, expected one known at translation")
+        if isinstance(found, (int, float)) and one.kind in ("Real", "Integer"):
+            return float(found) if one.kind == "Real" else int(found)
+        return found
 
     def prepare(self) -> None:
         """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""
         self.scope.check_replaced()
         for one in self.members.values():
             one.full  # noqa: B018  (what is final is told here)
-            if one.present and one.shape is not None:
+            if one.present and one.is_object:
+                self.member(one.name)
+            elif one.present and one.shape is not None:
                 for child in one.children if "outer" not in one.prefixes else ():
                     child.prepare()
         for section in self.scope.sections:
@@ -163,34 +158,38 @@ class Structure:
                 self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
     def type_of(self, reference: tree.ComponentReference) -> str:
-        here: Structure = self
-        for name, _ in reference.parts:
-            if not here.has(name):
-                break
-            one = here.members[name]
-            if one.primitive is not None:
-                return one.type_name
-            if not one.children:
-                break
-            here = one.children[0]
-        return ""
+        one = self._leaf(reference)
+        return "" if one is None else one.type_name
+
+    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+        one = self._leaf(reference)
+        if one is None or one.kind == "Boolean":
+            return None
+        said = [one.full.inner.get(name) for name in ("min", "max")]
+        if None in said:
+            raise ModelError(f"found '{one.name}' by its value before, expected its min and max")
+        low, high = (int(self.folded(limit)) for limit in said if limit is not None)
+        return low, high
 
     def is_fixed(self, expression: Any) -> bool:
         return all(map(self._is_known, references(expression)))
 
     def _is_known(self, reference: tree.ComponentReference) -> bool:
         """Whether a reference leads to a parameter or constant."""
-        here: Structure = self
+        if not self.has(reference.parts[0][0]):
+            return reference.parts[0][0] != "time"
+        one = self._leaf(reference)
+        return one is None or one.is_parameter
+
+    def _leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
+        """The number, Boolean, text or choice to which a reference leads; None for all else."""
+        here: Structure | None = self
         for name, _ in reference.parts:
-            if not here.has(name):
-                return here is self and name != "time"
-            one = here.members[name]
-            if one.primitive is not None:
-                return one.is_parameter
-            if not one.children:
-                break
-            here = one.children[0]
-        return True
+            one = here.members.get(name) if here is not None else None
+            if one is None or one.primitive is not None:
+                return one
+            here = one.children[0] if one.children else None
+        return None
 
 
 @dataclass(eq=False)
@@ -261,6 +260,10 @@ class ClassMember:
     def primitive(self) -> ClassScope | None:
         """The class of the language that it is in the end; None for another class."""
         return self.chain[-1] if self.chain else None
+
+    @property
+    def is_object(self) -> bool:
+        return self.primitive is None and self.plain_type.is_external_object
 
     @property
     def kind(self) -> str:
@@ -353,9 +356,7 @@ class ClassMember:
             return meant.children
         clause, scope = self.clause
         if len(self.shape) > 1:
-            scope.refuse(
-                clause.at, f"found an array of components of {len(self.shape)} dimensions, expected one"
-            )
+            scope.refuse(clause.at, f"found components of {len(self.shape)} dimensions, expected one")
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
             scope.refuse(
@@ -372,9 +373,7 @@ class ClassMember:
         around = self.owner
         while around is not None:
             if around.scope.definition is kind.definition:
-                scope.refuse(
-                    clause.at, f"found a component of {kind.name} within itself, expected another class"
-                )
+                scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
             around = around.around
         return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
 
