@@ -117,3 +117,20 @@ def test_wrong_text_is_refused_by_line_and_column(text, place, words, tmp_path):
     line, column = place.split(":")
     with pytest.raises(ModelError, match=f"line {line}, column {column}: {words}"):
         gantrytau.flatten(load_modelica(tmp_path / "wrong.mo")["M"]())
+
+
+def test_what_is_no_path_another_encoding_and_a_folder_without_its_package_are_refused(tmp_path):
+    (tmp_path / "wide.mo").write_text("model M end M;", encoding="utf-16")
+    (tmp_path / "Lib").mkdir()
+    (tmp_path / "Lib" / "A.mo").write_text("model A end A;")
+    (tmp_path / "use.mo").write_text("model M\n  Lib.A a;\nend M;")
+    for given, words in (
+        (3, "found 3, expected the path"),
+        (tmp_path / "wide.mo", "in UTF-16, .*iconv -f utf-16"),
+    ):
+        with pytest.raises(ModelError, match=words):
+            load_modelica(given)
+    with pytest.raises(ModelError, match="found 3, expected the path"):
+        load_modelica(tmp_path / "use.mo", libraries=3)
+    with pytest.raises(ModelError, match="Lib: found a folder without package"):
+        gantrytau.flatten(load_modelica(tmp_path / "use.mo", libraries=[tmp_path])["M"]())

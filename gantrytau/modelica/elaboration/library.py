@@ -115,7 +115,8 @@ def load_modelica(
     """
     if not paths:
         raise ModelError("load_modelica: found no file, expected at least one, as load_modelica('robot.mo')")
-    given = [Path(p) for p in ([libraries] if isinstance(libraries, str | os.PathLike) else libraries)]
+    several = isinstance(libraries, Iterable) and not isinstance(libraries, str)
+    given = [_path(p) for p in (libraries if several else [libraries])]
     others = [Path(p) for p in os.environ.get("MODELICAPATH", "").split(os.pathsep) if p]
     for folder in given:
         if not folder.is_dir():
@@ -124,9 +125,13 @@ def load_modelica(
                 place=str(folder),
                 argument="libraries",
             )
-    return ModelicaLibrary(
-        [Path(p) for p in paths], [*given, *(folder for folder in others if folder.is_dir())]
-    )
+    return ModelicaLibrary([*map(_path, paths)], [*given, *(folder for folder in others if folder.is_dir())])
+
+
+def _path(given: Any) -> Path:
+    if not isinstance(given, (str, os.PathLike)):
+        raise ModelError(f"load_modelica: found {given!r}, expected the path of a file or folder")
+    return Path(given)
 
 
 def _empty_package(name: str) -> tree.ClassDefinition:
@@ -168,6 +173,8 @@ def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None
     if name != "package" and (file := folder / f"{name}.mo").is_file():
         found = read_tree(file)
         return ClassScope(found.classes[0], found.source, around)
+    if next((folder / name).glob("*.mo"), None) is not None:
+        raise ModelError("found a folder without package.mo, expected one", place=str(folder / name))
     return None
 
 
