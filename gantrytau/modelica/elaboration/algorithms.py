@@ -59,7 +59,8 @@ class Execution:
 
     def _call(self, item: tree.ProcedureCall, reader: Interpreter) -> None:
         if item.call.function.parts[-1][0] != "assert":
-            reader.scope.refuse(item.at, "found the call of a function whose results are lost, expected ':='")
+            reader.results(item.call)
+            return
         holds = reader.value(item.call.arguments[0])
         if not isinstance(holds, ca.SX) and not holds:
             reader.scope.refuse(item.at, f"found what does not hold: {reader.value(item.call.arguments[1])}")
@@ -267,10 +268,10 @@ def called_class(
         pass
     outputs = [n for n, e in scope.elements.items() if "output" in e.clause.prefixes]
     missing = next((n for n in outputs if _is_open(run.known[n])), None)
-    if missing is not None or not outputs:
+    if missing is not None:
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
-    return found if len(found) > 1 else first_result(found)
+    return found if len(found) != 1 else first_result(found)
 
 
 def _is_open(value: Any) -> bool:

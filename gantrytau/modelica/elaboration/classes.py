@@ -141,10 +141,9 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             body[name] = _component(one)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
-        start = Modifier(call.arguments[0], scope)
-        body[sample_name(call)] = Discrete(
-            Bound(start, structure), unit="s", description="next instant of sample()"
-        )
+        known = structure.is_fixed(call.arguments[0])  # else it is set at the start
+        start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
+        body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):

@@ -62,7 +62,7 @@ class Surroundings(Protocol):
 
 def first_result(value: Any) -> Any:
     """The first of several results of a function, which is its value in an expression."""
-    return next(iter(value)) if isinstance(value, tuple) else value
+    return next(iter(value), None) if isinstance(value, tuple) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +124,10 @@ class Interpreter:
         return values.unary(e.operator, self.value(e.operand))
 
     def _binary(self, e: tree.Binary) -> Any:
-        return values.binary(e.operator, self.value(e.left), self.value(e.right))
+        left = self.value(e.left)
+        if e.operator in ("and", "or") and left is (e.operator == "or"):
+            return left  # the other side may have no value
+        return values.binary(e.operator, left, self.value(e.right))
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)

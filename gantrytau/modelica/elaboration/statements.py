@@ -60,7 +60,10 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
             instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
             passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
             action = instant == pre(instant) + passed * period
-            yield WhenChain((Happening(time >= instant, (action,), "sample", True),))
+            advance = Happening(time >= instant, (action,), "sample", True)
+            first = at_start((instant == reader.value(call.arguments[0]),))
+            known = reader.members.is_fixed(call.arguments[0])
+            yield WhenChain((advance,) if known else (first, advance))
     elif isinstance(item, tree.Branching):
         yield from _branches(item, reader)
     elif isinstance(item, tree.ProcedureCall):
