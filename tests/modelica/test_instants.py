@@ -82,13 +82,14 @@ def test_tables_are_read_by_external_functions(smoothness, beyond, wanted, tmp_p
 
 TOGETHER = """model M
   Boolean b = time > 0.25;
-  Integer n(start=0), few(start=0), many(start=0), edges(start=0), before(start=0);
+  Integer pair[2](each start=0), n(start=0), few(start=0), many(start=0), edges(start=0), before(start=0);
 equation
   when sample(0.1, 0.1) then
     n = pre(n) + 1;
   end when;
   when sample(0.1, 0.1) and n < 3 then
     few = pre(few) + 1;
+    pair = {few, n};
   end when;
   when n > 2 and sample(0.1, 0.1) then
     many = pre(many) + 1;
@@ -107,6 +108,7 @@ def test_what_stands_beside_an_instant_has_the_new_values_and_pre_the_old_ones(t
     (tmp_path / "together.mo").write_text(TOGETHER)
     found = simulate(load_modelica(tmp_path / "together.mo")["M"](), stop=0.55)
     assert [found.final(n) for n in ("n", "few", "many", "edges", "before")] == [5, 2, 3, 0, 2]
+    assert found.final("pair").tolist() == [2, 2]
 
 
 PERIODS = """model M

@@ -31,18 +31,8 @@ from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.references import nodes_of
 
 CLASSES = ("model", "block", "connector", "record", "class")
-TAKEN = frozenset(
-    [
-        "equations",
-        "initial_equations",
-        "members",
-        "modified",
-        "modifications",
-        "chosen_starts",
-        "shaped",
-        "structure",
-    ]
-)
+TAKEN = frozenset(("equations", "initial_equations", "members", "modified", "modifications", "chosen_starts"))
+TAKEN |= {"shaped", "structure"}
 
 
 class TextClass(Declared):
@@ -331,7 +321,8 @@ def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
     """A statement; a chain of `when` also gives what it sets the values of initial algorithms."""
     if not isinstance(stated, WhenChain) or not firsts:
         return stated
-    actions = (action for one in stated.branches for action in one.actions if isinstance(action, ca.SX))
-    names = {action.dep(0).name() for action in actions if action.dep(0).is_symbolic()}
-    own = tuple(one for one in firsts if one.dep(0).name() in names)
+    actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]
+    names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
+    scalars = (scalar for one in firsts for scalar in one.elements())
+    own = tuple(one for one in scalars if one.dep(0).name() in names)
     return WhenChain((at_start(own), *stated.branches)) if own else stated

@@ -16,7 +16,7 @@ from gantrytau.modelica.elaboration.statements import AbsentComponent
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
 
-AT_START = "at_start"
+AT_START = "initial"  # a keyword, which no component has as its name
 
 
 def sample_name(call: tree.Call) -> str:

@@ -274,9 +274,8 @@ def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
         if len(item.branches) == 1:
             test, rest = _instant_and_rest(test)
             conditions = (test,) if rest is not None else conditions
-            actions = (
-                tuple(_guarded(one, reader.value(rest)) for one in actions) if rest is not None else actions
-            )
+            if rest is not None:
+                actions = tuple(_guarded(actions, reader.value(rest)))
         for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
             if _is_call(one, "initial"):
                 yield at_start(actions)
@@ -304,15 +303,17 @@ def _instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expr
     return test, None
 
 
-def _guarded(action: Any, test: Any) -> Any:
-    """An action where a condition holds with the new values of what changes at the instant, else none."""
+def _guarded(actions: Sequence[Any], test: Any) -> Iterator[Any]:
+    """Actions where a condition holds with the new values of what changes at the instant, else none."""
     test = values.condition(test)
-    if isinstance(action, Reinit):
-        return reinit(action.variable, if_else(test, action.value, action.variable))
-    if not isinstance(action, ca.SX):
-        raise ModelError("found terminate() beside sample() and another condition, expected another when")
-    left = action.dep(0)
-    return left == if_else(test, action.dep(1), pre(left))
+    for one in actions:
+        if isinstance(one, Reinit):
+            yield reinit(one.variable, if_else(test, one.value, one.variable))
+        elif isinstance(one, ca.SX):
+            for scalar in one.elements():
+                yield scalar.dep(0) == if_else(test, scalar.dep(1), pre(scalar.dep(0)))
+        else:
+            raise ModelError("found terminate() beside sample() and another condition, expected another when")
 
 
 def at_start(actions: tuple[Any, ...]) -> Happening:
