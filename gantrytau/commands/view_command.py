@@ -1,7 +1,7 @@
 """`gantrytau view`: a model in a pose, or the motion of a result that was saved, as a page for any browser."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -42,6 +42,18 @@ def view(
             show_default=False,
         ),
     ] = None,
+    slider: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=LOW..HIGH]",
+            help="A slider that moves a variable or a parameter, as 'crank.phi=-90 deg..90 deg'. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Serve the page and compute each pose as it is asked for, until Ctrl-C."),
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write this page.", show_default="MODEL.html")
     ] = None,
@@ -58,18 +70,52 @@ def view(
             raise CommandError(
                 "found --pose and --result, expected one of them; a motion has poses of its own"
             )
+        if (slider or live) and result:
+            raise CommandError(
+                f"found {'--slider' if slider else '--live'} and --result, expected one of them; a motion has no sliders"
+            )
+        if live and (output or json):
+            raise CommandError(
+                f"found --live and {'--output' if output else '--json'}, expected one of them; a live page is no file"
+            )
         writable_place("--output", output, ".html", ".htm")
+        page: Any
         motions = [read_result(file, "--result") for file in result or ()]
         values = pairs("--pose", pose)
         chosen = build(model, prototype, set_ or ())
         with busy(f"translating {chosen.name}"):
             dae = translate(chosen.model, events=True)
         check_names("--pose", values, dae.expand)
+        ranges = dict(_range(text) for text in slider or ())
+        check_names("--slider", ranges, dae.expand)
         if motions:
             names = [motion.title for motion in motions] if len(motions) > 1 else None
             page = animate(motions, model=dae, speed=speed, names=names)
+        elif live:
+            _serve(gantrytau.view(dae, values, sliders=ranges or None, live=True))
+            return
         else:
-            page = gantrytau.view(dae, values)
+            with busy(f"posing {chosen.name}"):
+                page = gantrytau.view(dae, values, sliders=ranges or None)
         files = written(output or Path(f"{chosen.name}.html"), page.save)
         record = {**chosen.record("model"), "file": files[0], "bytes": len(page.text.encode())}
         answered(json, record, None, files)
+
+
+def _range(text: str) -> tuple[str, tuple[str, str] | None]:
+    """Name and range of a slider, `crank.phi=-90 deg..90 deg` or `crank.phi`."""
+    name, told, limits = (part.strip() for part in text.partition("="))
+    if not told:
+        return name, None
+    low, between, high = (part.strip() for part in limits.partition(".."))
+    if not between:
+        raise CommandError(
+            f"--slider {text}: found {limits}, expected LOW..HIGH, as '0.1..0.5' or '-90 deg..90 deg'"
+        )
+    return name, (low, high)
+
+
+def _serve(page: Any) -> None:
+    typer.echo(f"Served at {page.url} until Ctrl-C")
+    page.show()
+    page.wait()

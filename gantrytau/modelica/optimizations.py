@@ -62,22 +62,16 @@ def _times(arguments: tuple[tree.AnyArgument, ...], source: SourceText) -> Itera
 
 
 def _time(argument: tree.Argument) -> tree.ComponentClause:
-    """`finalTime(free=true)` as `parameter Real finalTime(unit="s", free=true)`."""
+    """`finalTime(min=1) = 2` as `redeclare parameter Real finalTime(free=false, min=1) = 2`."""
     at, said = argument.at, argument.modification
-    given = () if said is None else said.arguments or ()
-    unit = tree.Argument(at, (), "unit", tree.Modification(at, None, tree.StringLiteral(at, "s")), None)
-    known = any(isinstance(one, tree.Argument) and one.name == "unit" for one in given)
-    all_given = given if known else (unit, *given)
-    declared = tree.ComponentDeclaration(
-        at,
-        argument.description or TIMES[argument.name],
-        None,
-        argument.name,
-        (),
-        tree.Modification(at, all_given, None if said is None else said.value),
-        None,
-    )
-    return tree.ComponentClause(at, ("parameter",), "Real", (), (declared,), None)
+    given, value = (None, None) if said is None else (said.arguments, said.value)
+    names = {one.name for one in given or () if isinstance(one, tree.Argument)}
+    fixed = tree.Modification(at, None, tree.BooleanLiteral(at, False))
+    extra = () if value is None or "free" in names else (tree.Argument(at, (), "free", fixed, None),)
+    name, description = argument.name, argument.description or TIMES[argument.name]
+    told = tree.Modification(at, (*extra, *(given or ())), value)
+    declared = tree.ComponentDeclaration(at, description, None, name, (), told, None)
+    return tree.ComponentClause(at, ("redeclare", "parameter"), "Real", (), (declared,), None)
 
 
 def _unbound(

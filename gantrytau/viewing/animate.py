@@ -1,7 +1,7 @@
 """`view` and `animate`: a model in a pose, or a motion, as one page for any browser."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,33 +16,57 @@ from gantrytau.results.result import Result
 
 if TYPE_CHECKING:
     from gantrytau.viewing.film import Film
+    from gantrytau.viewing.live import LivePage
     from gantrytau.viewing.page import Page
 
 FileName = str | os.PathLike[str]
 Shown = Model | type[Model] | Dae
 
 
+@shows_progress
 def view(
     model: Shown,
     pose: Mapping[str, Any] | None = None,
     *,
     file: FileName | None = None,
     around: Sequence[Any] = (),
-) -> "Page":
+    sliders: Any = None,
+    configurations: Mapping[str, Mapping[str, Any]] | None = None,
+    live: bool = False,
+) -> "Page | LivePage":
     """A model in a pose, as one page that needs no network and shows itself in a notebook.
 
     pose: values of variables, as of `Dae.evaluate`, `{"tool.r": [0.5, 2.8, -0.8]}`; what it leaves open is as at the start.
     file: where the page is saved, too; around: obstacles, as `Box` of `gantrytau.kinematics`, and a workspace. Components of
     `mechanics.multibody` are seen; a method `shapes()` says of one's own what they look like.
+    sliders: variables and parameters that are moved on the page, by names or with their ranges, {"crank.phi": ("-90 deg",
+    "90 deg"), "crank.length": None}, up to four, or True for the coordinates that are states; loops close at all choices of
+    them, which are computed before. What cannot be is red and says why. configurations: start values of other assemblies by
+    name, {"elbow up": {"rod.phi": 1.2}}, to choose from. live: each pose is computed when it is asked for, by this program,
+    for any number of sliders; see `LivePage`.
     Raises ModelError for what cannot be shown, InitializationError for a pose that cannot be.
     """
-    from gantrytau.viewing.film import film_of
+    from gantrytau.viewing.film import film_of, scalars_of
 
     dae = _translated(model)
     instance("view", "pose", pose, (Mapping, type(None)), "values by name, {'tool.r': [0.5, 2.8, -0.8]}")
+    if sliders is not None or configurations or live:
+        from gantrytau.viewing.sliders import Posing, poses_page
+
+        posing = Posing(dae, True if sliders is None else sliders, dict(pose or {}), configurations, around)
+        if live:
+            from gantrytau.viewing.live import LivePage
+
+            if file is not None:
+                words = "expected none: a live page is served, not saved"
+                raise ModelError(words, place="view", found=Given("file", file))
+            return LivePage(posing)
+        return _saved(poses_page(posing), dae.name, file)
     values = dae.evaluate(dict(pose or {}))
     constants = {name: float(value) for name, value in dae.parameter_values.items()}
-    pose_only = Result([0.0], {**constants, **dict(_scalars(values))}, title=dae.name, shapes=dae.flat.shapes)
+    pose_only = Result(
+        [0.0], {**constants, **dict(scalars_of(values))}, title=dae.name, shapes=dae.flat.shapes
+    )
     return _page([film_of(pose_only, model=dae, around=around)], [""], dae.name, file)
 
 
@@ -112,16 +136,14 @@ def _every(step: float, times: np.ndarray) -> np.ndarray:
     return np.append(np.arange(times[0], times[-1] - 1e-3 * step, step), times[-1])
 
 
-def _scalars(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
-    """Scalars by name of values that may be arrays."""
-    for name, value in values.items():
-        array = np.asarray(value, dtype=float)
-        for index in np.ndindex(*array.shape):
-            yield (f"{name}[{','.join(map(str, index))}]" if index else name), float(array[index])
-
-
 def _page(films: "Sequence[Film]", names: Sequence[str], title: str, file: FileName | None) -> "Page":
-    from gantrytau.viewing.page import Page, page
+    from gantrytau.viewing.page import page
 
-    made = Page(page(films, names, title), title)
+    return _saved(page(films, names, title), title, file)
+
+
+def _saved(text: str, title: str, file: FileName | None) -> "Page":
+    from gantrytau.viewing.page import Page
+
+    made = Page(text, title)
     return made if file is None else replace(made, file=made.save(file))

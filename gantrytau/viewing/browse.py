@@ -1,11 +1,8 @@
 """`browse`: results as one page in which variables are found, drawn over each other and read."""
 
-import html
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,15 +11,25 @@ from gantrytau.border.refusal import Given, ModelError
 from gantrytau.results.display_units import Display
 from gantrytau.results.result import Result
 from gantrytau.viewing.animate import Shown, animate
+from gantrytau.viewing.assembled import assembled
 from gantrytau.viewing.film import series_of
 from gantrytau.viewing.packed_runs import packed
 from gantrytau.viewing.page import Page
 
-FOLDER = Path(__file__).parent / "results_page"
 STYLES = ("uplot/uPlot.min.css", "page.css")
 SCRIPTS = (  # in the order in which they need each other; uPlot 1.6.32 is under the MIT licence, uplot/LICENSE
     "uplot/uPlot.iife.min.js",
-    *("data.js", "curves.js", "tree.js", "legend.js", "panels.js", "export.js", "scene.js", "page.js"),
+    *(
+        "data.js",
+        "curves.js",
+        "tree.js",
+        "legend.js",
+        "panels.js",
+        "export.js",
+        "frame.js",
+        "scene.js",
+        "page.js",
+    ),
 )
 
 
@@ -58,7 +65,8 @@ def browse(
     kept, begun = (_names(argument, chosen) for argument, chosen in (("names", names), ("first", first)))
     title = ", ".join(dict.fromkeys(run.title for run in runs if run.title)) or "Results"
     drawn, told = _scene(results, runs, named, model) if scene else ("", None)
-    made = Page(_text(title, packed(runs, named, kept, begun, display, told), drawn), title)
+    blocks = packed(runs, named, kept, begun, display, told)
+    made = Page(assembled(title, "page.html", blocks, drawn, STYLES, SCRIPTS), title)
     return made if file is None else replace(made, file=made.save(file))
 
 
@@ -93,24 +101,3 @@ def _titles(titles: Any, own: list[str]) -> list[str]:
         raise ModelError(words, place="browse", found=Given("titles", titles))
     said = own if titles is None else [str(title) for title in titles]
     return said if len(set(said)) == len(said) else [f"{title} ({k + 1})" for k, title in enumerate(said)]
-
-
-def _text(title: str, blocks: Sequence[str], scene: str) -> str:
-    """The HTML of the page, with that of the scene in it as a text of JSON."""
-    read = {name: (FOLDER / name).read_text(encoding="utf-8") for name in (*STYLES, *SCRIPTS, "page.html")}
-    frame = json.dumps(scene).replace("<", "\\u003c")  # nothing in it ends the script
-    body = read["page.html"].replace("{title}", html.escape(title))
-    return "\n".join(
-        [
-            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            f"<title>{html.escape(title)}</title>",
-            *(f"<style>{read[name]}</style>" for name in STYLES),
-            f'</head><body>{body}<script type="text/plain" id="data">',
-            *blocks,
-            "</script>",
-            f'<script type="application/json" id="scene-page">{frame}</script>',
-            *(f"<script>{read[name]}</script>" for name in SCRIPTS),
-            "</body></html>\n",
-        ]
-    )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.border.checks import array
+from gantrytau.border import checks
 from gantrytau.border.refusal import ModelError
 from gantrytau.dae import Dae
 from gantrytau.language.self_description.appearance import Shape, Value
@@ -33,7 +33,7 @@ class Film:
     """A result, or a pose, at times (N,) in s: those of the pictures, which follow one another by `step` s of the page.
 
     constants: numbers that the result does not hold, by name; shapes: what is seen, by the names of places; around: what
-    stands around it, in numbers.
+    stands around it, in numbers; failed: pictures (N,) of poses that cannot be, which are red.
     """
 
     series: Series
@@ -43,6 +43,7 @@ class Film:
     bindings: tuple[Binding, ...] = ()
     shapes: tuple[Shape, ...] = ()
     around: tuple[Shape, ...] = ()
+    failed: np.ndarray | None = None
 
     @property
     def title(self) -> str:
@@ -65,7 +66,7 @@ class Film:
 
     def _numbers(self, what: Value, shape: tuple[int, ...]) -> np.ndarray:
         """Numbers of a shape; ModelError for what has another one, or is not finite."""
-        found = array(self.title or "result", "shapes()", what)
+        found = checks.array(self.title or "result", "shapes()", what)
         self._check(what, found, shape)
         return found
 
@@ -148,7 +149,7 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     arcs: Sequence[Any] = getattr(shown, "arcs", ())
     bindings = tuple(Binding(arc.name, arc.begin, arc.end) for arc in arcs if arc.side in ("max", "min"))
     times = np.linspace(first, last, pictures + 1)
-    return Film(series, times, step, constants, bindings, shapes, tuple(_surroundings(around)))
+    return Film(series, times, step, constants, bindings, shapes, tuple(surroundings(around)))
 
 
 def series_of(verb: str, shown: Any) -> Result:
@@ -173,7 +174,16 @@ def _root(series: Series, shapes: Sequence[Shape]) -> str:
     return next(one[: -len(end) - 1] for one in ends for end in names if one.endswith(f".{end}"))
 
 
-def _surroundings(around: Any) -> Iterator[Shape]:
+def scalars_of(values: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """Scalars by name of values that may be arrays."""
+    for name, value in values.items():
+        array = np.asarray(value, dtype=float)
+        for index in np.ndindex(*array.shape):
+            yield (f"{name}[{','.join(map(str, index))}]" if index else name), float(array[index])
+
+
+def surroundings(around: Any) -> Iterator[Shape]:
+    """The shapes of what stands around; ModelError for what has none."""
     for one in around if isinstance(around, (list, tuple)) else [around]:
         if isinstance(one, Shape):
             yield one

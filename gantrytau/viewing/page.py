@@ -5,7 +5,7 @@ import html
 import io
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,29 +54,35 @@ class Page:
 
 def page(films: Sequence[Film], names: Sequence[str], title: str) -> str:
     """The HTML of motions beside each other, each under its name."""
-    with _quiet_server() as server:
-        scene, playing = server.scene, []
-        corners = np.array([extent(film) for film in films])  # (films, 2, 3)
-        whole = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max()) or 1.0
-        shifts = np.zeros((len(films), 3))
-        widths = np.maximum(corners[:, 1, 0] - corners[:, 0, 0], 0.3 * whole) + 0.25 * whole
-        shifts[1:, 0] = np.cumsum((widths[1:] + widths[:-1]) / 2)
-        shifts[:, 0] += corners[0].mean(axis=0)[0] - corners.mean(axis=1)[:, 0]
-        for film, name, (low, high), shift in zip(films, names, corners, shifts, strict=True):
-            parent = f"/{name or film.title or 'model'}".replace(" ", "_")
-            scene.add_frame(parent, show_axes=False, position=shift)
-            if name:
-                above = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 0.12 * whole]
-                scene.add_label(f"{parent}/name", name, position=np.array(above))
-            scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.0025 * whole)
-            playing += [_Player(scene, f"{parent}/{k}", film, s) for k, s in enumerate(solids(film))]
-        _stage(server, corners + shifts[:, None], whole)
+    with quiet_server() as server:
+        playing = staged(server, films, names)
         serializer = server.get_scene_serializer()
         for k in range(1, max(len(film.times) for film in films)):
             serializer.insert_sleep(max(float(film.step) for film in films))
             for player in playing:
                 player.go(k)
         return _titled(serializer.as_html(), title)
+
+
+def staged(server: Any, films: Sequence[Film], names: Sequence[str]) -> list["Player"]:
+    """Motions beside each other on the scene of a server, and the players that move them."""
+    scene, playing = server.scene, []
+    corners = np.array([extent(film) for film in films])  # (films, 2, 3)
+    whole = float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).max()) or 1.0
+    shifts = np.zeros((len(films), 3))
+    widths = np.maximum(corners[:, 1, 0] - corners[:, 0, 0], 0.3 * whole) + 0.25 * whole
+    shifts[1:, 0] = np.cumsum((widths[1:] + widths[:-1]) / 2)
+    shifts[:, 0] += corners[0].mean(axis=0)[0] - corners.mean(axis=1)[:, 0]
+    for film, name, (low, high), shift in zip(films, names, corners, shifts, strict=True):
+        parent = f"/{name or film.title or 'model'}".replace(" ", "_")
+        scene.add_frame(parent, show_axes=False, position=shift)
+        if name:
+            above = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2] + 0.12 * whole]
+            scene.add_label(f"{parent}/name", name, position=np.array(above))
+        scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.0025 * whole)
+        playing += [Player(scene, f"{parent}/{k}", film, s) for k, s in enumerate(solids(film))]
+    _stage(server, corners + shifts[:, None], whole)
+    return playing
 
 
 def _titled(text: str, title: str) -> str:
@@ -104,17 +110,21 @@ def _stage(server: Any, corners: np.ndarray, whole: float) -> None:
     server.initial_camera.look_at = middle
 
 
-class _Player:
+class Player:
     """A solid on a page, moved from picture to picture where something changes."""
 
     def __init__(self, scene: Any, name: str, film: Film, solid: Solid):
+        self.handle, self.role = _added(scene, name, solid), solid.role
+        self.shown: list[Any] = [None] * 4
+        self.put(film, solid)
+
+    def put(self, film: Film, solid: Solid) -> None:
+        """Show this solid of the same kind from here on, at its first picture."""
         from scipy.spatial.transform import Rotation
 
-        self.solid, self.film = solid, film
+        self.solid = replace(solid, role=self.role)  # one picture does not tell what stays
         self.q = Rotation.from_matrix(solid.R).as_quat()[:, [3, 0, 1, 2]]
-        self.handle = _added(scene, name, solid)
         self.limited = _at_limits(film, solid)
-        self.shown: list[Any] = [None] * 4
         self.go(0)
 
     def go(self, k: int) -> None:
@@ -142,7 +152,11 @@ class _Player:
 
 def _at_limits(film: Film, solid: Solid) -> np.ndarray:
     """Whether something of the component of a solid is at its limit, at each picture; forces keep their colour."""
-    found = np.zeros(film.times.size, dtype=bool)
+    found = (
+        np.zeros(film.times.size, dtype=bool)
+        if film.failed is None or solid.role not in PARTS
+        else film.failed.copy()
+    )
     for binding in film.bindings if solid.role in PARTS else ():
         component = binding.name.rpartition(".")[0]
         if component and (solid.owner == component or solid.owner.startswith(f"{component}.")):
@@ -217,7 +231,7 @@ def _mesh(file: Path | None) -> Any:
 
 
 @contextlib.contextmanager
-def _quiet_server() -> Iterator[Any]:
+def quiet_server() -> Iterator[Any]:
     """A scene of viser. It brings a server along, on a free port of this machine only, which is gone again at once."""
     try:
         import viser
@@ -225,9 +239,11 @@ def _quiet_server() -> Iterator[Any]:
         raise ModelError(
             "found no viser, which shows models, expected it installed; pip install 'gantrytau[view]'"
         ) from None
-    with contextlib.redirect_stdout(io.StringIO()):
+    silence = io.StringIO()
+    with contextlib.redirect_stdout(silence):
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        try:
-            yield server
-        finally:
+    try:
+        yield server
+    finally:
+        with contextlib.redirect_stdout(silence):
             server.stop()

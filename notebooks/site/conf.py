@@ -7,6 +7,8 @@ html_theme = "furo"
 html_title = "gantrytau"
 html_static_path = ["style"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
+html_logo = html_favicon = "style/logo.svg"
 html_copy_source = False
 html_show_copyright = False
 html_last_updated_fmt = None

@@ -118,8 +118,8 @@ def test_the_model_moves_with_the_cursor(tab, tmp_path):
     tab.rest(0.5)
     thumb = tab.run("(r => [r.left, r.top])(document.querySelector('iframe').getBoundingClientRect())")
     rail = tab.run(
-        "(r => [r.left, r.top, r.width, r.height])(document.querySelector('iframe').contentDocument"
-        ".querySelector('.mantine-Slider-track').getBoundingClientRect())"
+        "(r => [r.left, r.top, r.width, r.height])(Element.prototype.getBoundingClientRect.call("
+        "document.querySelector('iframe').contentDocument.querySelector('.mantine-Slider-track')))"
     )
     tab.press(thumb[0] + rail[0] + 0.25 * rail[2], thumb[1] + rail[1] + rail[3] / 2)
     tab.until("Math.abs(Panels.a - 0.5) < 0.05")

@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import animate, simulate, view
 from gantrytau.commands.demo.motion_problems import SixLinks
-from gantrytau_models import GantryTau, Pendulum, prototypes
+from gantrytau_models import FourBar, GantryTau, Pendulum, prototypes
 from gantrytau_optimica import optimize
 from tests.viewing.browser import browsing, found
 
@@ -98,3 +98,21 @@ def test_a_notebook_shows_it_in_a_frame(tab, tmp_path):
     tab.rest(2.5)
     assert coloured(above_the_slider(tab.picture())).mean() > 0.1 * DRAWN
     assert tab.errors == []
+
+
+def test_sliders_put_a_model_into_poses(tab, tmp_path):
+    page = view(FourBar(), sliders={"crank.phi": None, "crank.length": (0.3, 1.8)})
+    tab.open(page.save(tmp_path / "page.html"), element="body[data-ready]")
+    tab.rest(1.0)
+    begin = tab.picture()
+    for place, wanted in ((0, 2), (1, 30)):
+        tab.run(
+            f"(e => {{ e.value = {wanted}; e.dispatchEvent(new Event('input')); }})"
+            f"(document.querySelectorAll('input[type=range]')[{place}])"
+        )
+    tab.rest(1.5)
+    end = tab.picture()
+    assert "cannot be" in tab.run("document.getElementById('said').textContent")
+    assert reddish(begin).sum() == 0
+    assert reddish(end).mean() > DRAWN / 2
+    assert (tab.errors, afar(tab)) == ([], [])

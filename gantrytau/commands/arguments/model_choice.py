@@ -94,16 +94,18 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     else:
         chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
-    for name, value in _settings(settings, chosen.prototype):
+    in_text = choice.file is not None and choice.file.suffix == ".mo"
+    for name, value in _settings(settings, chosen.prototype, in_text):
         with refusing("--set "):
             model = with_setting(model, name, value)
     return Chosen(model, chosen.prototype)
 
 
-def _settings(settings: Sequence[str], made_from: str | None) -> Iterator[tuple[str, Any]]:
+def _settings(settings: Sequence[str], made_from: str | None, in_text: bool) -> Iterator[tuple[str, Any]]:
     """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`.
 
-    made_from: the prototype of the model; a file that says it belongs to another one is taken, with a warning.
+    made_from: the prototype of the model; a file that says it belongs to another one is taken, with a warning. in_text:
+    whether the model is Modelica text, whose choices have names.
     """
     for setting in settings:
         if setting.endswith(".toml") and "=" not in setting:
@@ -115,7 +117,7 @@ def _settings(settings: Sequence[str], made_from: str | None) -> Iterator[tuple[
             yield from values.items()
         else:
             name, value = split("--set", setting)
-            yield name, number("--set", name, value)
+            yield name, number("--set", name, value, words=in_text)
 
 
 def _wanted(choice: NamedObject, text: str, robot: str | None) -> str | None:

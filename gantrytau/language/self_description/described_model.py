@@ -112,7 +112,7 @@ def _inherited(kind: Any) -> Iterator[tuple[str, str]]:
     bases = [base for base in kind.__mro__[1:] if getattr(base, "members", None)]
     told, seen = [], set(vars(kind))
     for base in bases:
-        if base.__module__ == "gantrytau.language.model":
+        if base.__module__ in ("gantrytau.language.model", "gantrytau.modelica.elaboration.classes"):
             continue
         held = [name for name in base.members() if name in vars(base)]
         kept = [name for name in held if name not in seen]

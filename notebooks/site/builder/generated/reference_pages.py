@@ -66,6 +66,8 @@ def _sentence(one: PublicName) -> str:
 def group_page(group: TaskGroup) -> str:
     """The page of a task."""
     parts = [f"# {group.title}"]
+    if group.synonyms:  # the search finds the page by them
+        parts.insert(0, f"---\nmyst:\n  html_meta:\n    keywords: {', '.join(group.synonyms)}\n---")
     if group.words:
         parts.append(escaped(group.words, resolver("")))
     rows = [(reference(one), _sentence(one)) for one in group.names]

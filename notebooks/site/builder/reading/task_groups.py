@@ -5,7 +5,7 @@ says its task. A new name in an old file has its place without anybody's help.
 """
 
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from notebooks.site.builder.places import SOURCES
@@ -14,13 +14,16 @@ from notebooks.site.builder.reading.public_names import PublicName, public_names
 
 @dataclass(frozen=True)
 class TaskGroup:
-    """A page of the reference: its part of the site, file, title, an opening, and the modules that it is about."""
+    """A page of the reference: its part of the site, file, title, an opening, the modules that it is about, and what other
+    tools call its names.
+    """
 
     part: str
     file: str
     title: str
     words: str
     homes: tuple[str, ...]
+    synonyms: tuple[str, ...] = ()
     names: tuple[PublicName, ...] = field(default=())
 
 
@@ -29,7 +32,14 @@ def listed_groups() -> tuple[TaskGroup, ...]:
     """The tasks as they are listed, without names."""
     table = tomllib.loads((SOURCES / "reference.toml").read_text(encoding="utf-8"))
     return tuple(
-        TaskGroup(part["title"], one["file"], one["title"], one.get("words", ""), tuple(one["homes"]))
+        TaskGroup(
+            part["title"],
+            one["file"],
+            one["title"],
+            one.get("words", ""),
+            tuple(one["homes"]),
+            tuple(one.get("synonyms", ())),
+        )
         for part in table["part"]
         for one in part["group"]
     )
@@ -52,7 +62,7 @@ def task_groups() -> tuple[TaskGroup, ...]:
     for group in listed_groups():
         names = [one for one in public_names() if group_of(one.home) == group and not one.same_as]
         names.sort(key=lambda one: (_place(group, one.home), one.home, one.line))
-        found.append(TaskGroup(group.part, group.file, group.title, group.words, group.homes, tuple(names)))
+        found.append(replace(group, names=tuple(names)))
     return tuple(found)
 
 
