@@ -62,8 +62,8 @@ MEANINGS = (  # where a wrong model would run: text, line and column, words
     ("model M\n  Real x[2](start=1);\nend M;", "2:13", "found a scalar, expected \\[2\\]; 'each'"),
     (
         FUNCTION + "model M\n  Real x = f({1, 2, 3});\nend M;",
-        "2:14",
-        "found \\[3\\] for 'u', expected \\[2\\]",
+        "6:12",
+        "found \\[3\\] for 'u' of f, expected \\[2\\]",
     ),
     ("model M\n  Boolean b = time;\nend M;", "2:15", "found Real for 'b', expected Boolean"),
     ("model M\n  parameter String s = 3.5;\nend M;", "2:24", "found 3.5 for 's', expected String"),

@@ -83,33 +83,32 @@ class Execution:
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
                     reader.scope.refuse(target.at, f"found {kind} for '{name}', expected {wanted}")
-                if target.parts == ((name, ()),):
-                    self._check_shape(name, one, target.at)
                 try:
+                    if target.parts == ((name, ()),):
+                        self._check_shape(name, one)
                     self.known[name] = _with(self.known[name], target.parts, one, reader)
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
 
-    def _check_shape(self, name: str, value: Any, at: int) -> None:
-        shape = self.shapes.get(name)
-        if shape is not None and isinstance(value, (np.ndarray, bool, int, float, ca.SX)):
-            found = np.shape(value) if isinstance(value, np.ndarray) else ()
-            if found != shape:
-                words = f"found {values.sized(value)} for '{name}', expected {values.sized(np.empty(shape))}"
-                self.reader.scope.refuse(at, words)
+    def _check_shape(self, name: str, value: Any) -> None:
+        shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
+        if shape is not None and isinstance(value, plain) and np.shape(values.boxed(value)) != shape:
+            wanted = values.sized(np.empty(shape))
+            words = f"found {values.sized(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
+            raise ModelError(words)
 
     def declare(self, name: str, element: Element, value: Any) -> None:
-        """Let a variable of a function have a value; TextError for one of another type or size than is declared."""
+        """Let a variable of a function have a value; ModelError for one of another type or size than is declared."""
         self.known[name] = value
         reader = replace(self.reader, scope=element.scope, local={**self.reader.local, **self.known})
         sizes = [*element.declaration.subscripts, *element.clause.subscripts]
-        at, wanted = element.declaration.at, reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
+        wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
         if not fits(wanted, kind := type_of_value(value)):
-            reader.scope.refuse(at, f"found {kind} for '{name}', expected {wanted}")
+            raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
         if not any(isinstance(one, tree.Mark) for one in sizes) and not _is_array_type(element):
             self.shapes[name] = tuple(reader.value(one) for one in sizes)
             if value is not None:
-                self._check_shape(name, value, at)
+                self._check_shape(name, value)
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
         for inner in looped(item, reader):
