@@ -271,3 +271,11 @@ def test_functions_records_and_redeclared_models_compute_as_python_does():
     again = simulate(whole(around=dict(wind=0.0)))
     assert again["plain.x"][-1] < x[-1]
     assert simulate(whole(), parameters={"g.limits": [-0.5, 0.6]})["plain.x"][-1] > x[-1]
+
+
+def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
+    (tmp_path / "levels.mo").write_text(
+        "model Levels type Level = Real(min=0, start=2); Level h[3](each fixed=true); equation der(h) = -h; end Levels;"
+    )
+    levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"], stop=1.0, tolerance=1e-10)
+    np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)

@@ -4,7 +4,7 @@ A parameter that is asked for here shapes the model: its value is folded, and an
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -236,8 +236,9 @@ class ClassMember:
         if constraint is not None:
             said = merged(said, read_arguments(constraint.arguments, self.element.scope))
         for one in self.chain:
-            for _, modifier in one.bases:
-                said = merged(said, modifier)
+            for _, modifier in one.bases:  # attributes of a type are those of each element
+                each = {name: replace(said_of, each=True) for name, said_of in modifier.inner.items()}
+                said = merged(said, replace(modifier, inner=each))
         return said
 
     @cached_property
