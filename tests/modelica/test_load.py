@@ -277,5 +277,5 @@ def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
     (tmp_path / "levels.mo").write_text(
         "model Levels type Level = Real(min=0, start=2); Level h[3](each fixed=true); equation der(h) = -h; end Levels;"
     )
-    levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"], stop=1.0, tolerance=1e-10)
+    levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"](), stop=1.0, tolerance=1e-10)
     np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)
