@@ -23,7 +23,7 @@ ORDER = {  # a room imports the rooms before it
     "compiler results inputs simulation writing answers dae ensembles viewing __init__ kinematics mechanics blocks "
     "electrical commands cli",
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
-    "gantrytau_optimica": "problem control transcription solving failures answers refinement policy "
+    "gantrytau_optimica": "problem text control transcription solving failures answers refinement policy "
     "guesses_and_parameters prepared optimize "
     "studies fitting estimation paths calibration procedure identification learning vision __init__",
     "gantrytau_optimica.calibration": "data links fitting design diagnostics report named calibration calibrate "

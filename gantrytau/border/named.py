@@ -15,7 +15,7 @@ from typing import Any
 
 from gantrytau.border.refusal import GantryTauError, ModelError, did_you_mean, python_error, user_lines
 
-_PYTHON = re.compile(r"(?P<file>.+\.(?:py|mo))(?::(?P<name>.*))?", re.DOTALL)
+_PYTHON = re.compile(r"(?P<file>.+\.(?:py|mop?))(?::(?P<name>.*))?", re.DOTALL)
 _ROBOT = re.compile(r"(?P<file>.+\.(?:urdf|xml|mjcf|sdf))(?P<name>)", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(r"(?P<place>.+?)\s*\((?P<arguments>[^()]*)\)", re.DOTALL)
 
@@ -69,7 +69,7 @@ def named(text: str, folder: Path, library: str) -> Any:
     or prototype; errors of the call itself are not caught.
     """
     asked = NamedObject.read(text, folder)
-    if asked.file is not None and asked.file.suffix == ".mo":
+    if asked.file is not None and asked.file.suffix in (".mo", ".mop"):
         raise ModelError(
             f"found {text!r}, expected a class in a file of Python, as Robot = load_modelica(...)[...]"
         )

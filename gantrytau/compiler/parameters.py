@@ -71,6 +71,10 @@ def _with_value(parameter: FlatParameter, values: Mapping[str, object]) -> FlatP
         return [ca.SX(x) for x in found]
 
     own = parameter.name in values
+    given_names = [name for name in (parameter.name, *parameter.elements) if name in values]
+    if parameter.final and given_names:
+        words = f"parameters: found a value for '{given_names[0]}', which is declared final, expected none; leave it out"
+        raise ModelError(words, argument="parameters")
     elements = numbers(parameter.name, parameter.shape) if own else list(parameter.value)
     for index, name in enumerate(parameter.elements):
         if name in values and name != parameter.name:

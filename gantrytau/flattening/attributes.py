@@ -30,7 +30,9 @@ def flat_parameter(placed: Placed) -> FlatParameter:
     assert isinstance(declaration, Parameter)
     value, given = expression(placed, "value"), placed.attributes["value"].value is not declaration.value
     assumed = "" if given else declaration.assumed
-    return FlatParameter(**_common(placed), value=value, fold=declaration.fold, assumed=assumed)
+    return FlatParameter(
+        **_common(placed), value=value, fold=declaration.fold, final=declaration.final, assumed=assumed
+    )
 
 
 def expression(placed: Placed, attribute: str) -> tuple[ca.SX, ...]:
@@ -92,7 +94,7 @@ def _common(placed: Placed) -> dict[str, Any]:
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
         chosen=placed.chosen,
         owner=placed.path,
-        free=getattr(placed.declaration, "free", False),
+        free=bool(attributes["free"].value) if "free" in attributes else False,
         undetermined=attributes["undetermined"].value,
         **limits,
     )

@@ -100,6 +100,18 @@ def _check_same(connection: Connection, faces: list[Face], where: str) -> None:
             f"them only; connect connectors of the same class{did_you_mean(missing, sorted(a & b))}"
         )
 
+    for name, member in type(connection.a).members().items():
+        flows = {getattr(m, "kind", "") == "flow" for m in (member, type(connection.b).members()[name])}
+        sizes = [
+            getattr(end, name).shape for end in (connection.a, connection.b) if isinstance(member, Quantity)
+        ]
+        if len(flows) > 1 or len(set(sizes)) > 1:
+            what = "a flow in one of them only" if len(flows) > 1 else "of two sizes"
+            raise ModelError(
+                f"{where or 'the model'}: connect({faces[0][0]}, {faces[1][0]}) joins different connectors: '{name}' is "
+                f"{what}; connect connectors of the same class"
+            )
+
 
 def _set_equations(
     members: list[tuple[Connector, str, int]], closures: list[tuple[int, Closure]]

@@ -51,12 +51,13 @@ class FlatVariable(Record):
 class FlatParameter(FlatVariable):
     """A parameter: `value` holds one SX per scalar, a number or an expression of other parameters.
 
-    fold: its value shapes the equations and is folded in at translation; assumed: what is said of the value if it is
-    the one of the declaration, which nobody gave.
+    fold: its value shapes the equations and is folded in at translation; final: no other value may be given; assumed: what
+    is said of the value if it is the one of the declaration, which nobody gave.
     """
 
     value: tuple[ca.SX, ...] = ()
     fold: bool = False
+    final: bool = False
     assumed: str = ""
 
 

@@ -25,7 +25,7 @@ from gantrytau.language.symbols import Symbols, element_names, time
 
 ATTRIBUTES = (
     "start", "fixed", "min", "max", "nominal", "prefer", "value", "unit", "display", "description",
-    "undetermined",
+    "undetermined", "free",
 )  # fmt: skip
 
 
@@ -206,6 +206,10 @@ class _Growing(Instance):
                 raise ModelError(
                     f"{full}: found a start value, but it is a parameter, which has one value; write "
                     f"{name}=... with the number"
+                )
+            if "free" in changes and not isinstance(declaration, Parameter):
+                raise ModelError(
+                    f"{full}: found 'free' for a variable, expected a parameter; declare it as Input"
                 )
             attributes |= changes
         shape = _shape(declaration, attributes, instance, full)

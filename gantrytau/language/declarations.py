@@ -261,6 +261,8 @@ class Parameter(Quantity):
     """
 
     kind = "parameter"
+    free = False  # whether an optimiser chooses it
+    final = False  # in Modelica text: no other value may be given
 
     def __init__(
         self,

@@ -4,7 +4,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.expressions import ExpressionReader
 
 KINDS = frozenset(
-    {
+    [
         "class",
         "model",
         "record",
@@ -15,7 +15,7 @@ KINDS = frozenset(
         "function",
         "operator",
         "optimization",
-    }
+    ]
 )
 BEFORE_KINDS = ("encapsulated", "partial", "pure", "impure", "expandable")
 CLASS_BEGINS = KINDS | frozenset(BEFORE_KINDS)

@@ -31,11 +31,13 @@ class SourceText:
             return cls(str(path), found.decode("utf-8-sig"), optimica)
         except UnicodeDecodeError as error:
             at = len(found[: error.start].decode("utf-8", errors="ignore"))
+            wide = found[:2] in (b"\xff\xfe", b"\xfe\xff")
+            name, other = ("UTF-16", "utf-16") if wide else ("Latin-1", "latin1")
             words = (
-                f"found the byte 0x{found[error.start]:02x}, expected UTF-8; if the file is in Latin-1, convert it: "
-                f"iconv -f latin1 -t utf-8 {path.name}"
+                f"found the byte 0x{found[error.start]:02x}, expected UTF-8; if the file is in {name}, convert it: "
+                f"iconv -f {other} -t utf-8 {path.name}"
             )
-            raise ModelError(cls(str(path), found.decode("latin-1")).told(at, words)) from error
+            raise ModelError(cls(str(path), found.decode(other, errors="replace")).told(at, words)) from error
 
     def line_and_column(self, at: int) -> tuple[int, int]:
         """Line and column of an offset, both from 1."""

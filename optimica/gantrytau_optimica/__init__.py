@@ -69,6 +69,7 @@ from gantrytau_optimica.procedure import CalibrationPlan, Cell, load_plan, plan_
 from gantrytau_optimica.studies.pareto import pareto
 from gantrytau_optimica.studies.sensitivities import Sensitivities, sensitivities
 from gantrytau_optimica.studies.trade_off import TradeOff
+from gantrytau_optimica.text.load_optimica import load_optimica
 
 __all__ = [
     "Calibration",
@@ -129,6 +130,7 @@ __all__ = [
     "learn",
     "learn_cases",
     "link",
+    "load_optimica",
     "load_optimum",
     "load_plan",
     "optimize",

@@ -206,61 +206,25 @@ def test_each_condition_of_a_vector_acts_and_a_run_has_the_times_of_the_experime
     assert found.final("y").tolist() == [1.0, 1.0]
 
 
-WRONG = (  # text of a model, line and column, words
-    ("model M\n  Real x = 2 * yy;\n  Real y = 1;\nend M;", "2:16", "found the name 'yy'.*did you mean 'y'"),
-    ("model M\n  Rael x;\nend M;", "2:3", "found 'Rael', expected the name of a class; did you mean 'Real'"),
-    (
-        "model M\n  Real x(strat=1) = 1;\nend M;",
-        "2:10",
-        "found 'strat', which Real does not have; did you mean 'start'",
-    ),
-    (
-        "model A\n  Real x = 1;\nend A;\nmodel M\n  A a(y=2);\nend M;",
-        "5:7",
-        "found 'y' modified, which A does not have",
-    ),
-    ("model A\n  final parameter Real x = 1;\nend A;\nmodel M\n  A a(x=2);\nend M;", "5:7", ".*'final'"),
-    (
-        "model M\n  Real x[3] = {1, 2, 3} + {1, 2};\nend M;",
-        "2:15",
-        "found the sizes \\[3\\] and \\[2\\] beside '\\+'",
-    ),
-    (
-        "model M\n  Real x[3] = {1, 2, 3};\n  Real y = x[4];\nend M;",
-        "3:12",
-        "found the index 4, expected 1 to 3",
-    ),
-    ("model M\n  extends M;\nend M;", "1:7", "found M among the classes that it extends, expected no circle"),
-    (
-        "model M\n  Real x;\nequation\n  x = inStream(x);\nend M;",
-        "4:7",
-        "found inStream\\(\\), which is not supported",
-    ),
-    ("model M\n  Modelica.Electrical.R r;\nend M;", "2:3", "found 'Modelica.*libraries="),
-    (
-        "model M\n  Real x;\nequation\n  if time > 1 then\n    x = 1;\n  end if;\nend M;",
-        "4:3",
-        "found 1 and 0 equations",
-    ),
-    (
-        "model M\n  Integer n(start=0);\nequation\n  when n > pre(n) then\n    n = pre(n) + 1;\n  end when;\nend M;",
-        "4:3",
-        "found n beside pre\\(n\\) in the condition of when",
-    ),
-    (
-        "model M\n  parameter Integer n = n + 1;\n  Real x[n];\nend M;",
-        "2:25",
-        "found 'n', whose value needs itself",
-    ),
-)
+def test_initial_equations_determine_a_parameter_that_is_not_fixed(tmp_path):
+    (tmp_path / "found.mo").write_text(
+        "model M\n parameter Real k(fixed=false, start=1);\n Real x(start=2, fixed=true);\ninitial equation\n k * k = 9;\n"
+        "equation\n der(x) = -k * x;\nend M;"
+    )
+    found = simulate(load_modelica(tmp_path / "found.mo")["M"](), stop=1.0)
+    assert found.final("x") == pytest.approx(2 * np.exp(-3), rel=1e-6)
 
 
-@pytest.mark.parametrize(("text", "place", "words"), WRONG, ids=range(len(WRONG)))
-def test_wrong_text_is_refused_by_line_and_column(text, place, words, tmp_path):
-    (tmp_path / "wrong.mo").write_text(text)
-    line, column = place.split(":")
-    with pytest.raises(ModelError, match=f"line {line}, column {column}: {words}"):
-        gantrytau.flatten(load_modelica(tmp_path / "wrong.mo")["M"]())
+def test_what_is_final_has_no_other_value_and_a_flow_meets_flows(tmp_path):
+    (tmp_path / "final.mo").write_text(
+        "connector P\n Real v;\n flow Real i;\nend P;\nconnector Q\n Real v;\n Real i;\nend Q;\nmodel M\n P p;\n Q q;\n"
+        "equation\n connect(p, q);\nend M;\nmodel F\n final parameter Real k = 1;\n Real x = k;\nend F;"
+    )
+    library = load_modelica(tmp_path / "final.mo")
+    with pytest.raises(ModelError, match="'i' is a flow in one of them only"):
+        gantrytau.flatten(library["M"]())
+    with pytest.raises(ModelError, match="'k', which is declared final"):
+        simulate(library["F"](), stop=1.0, parameters={"k": 2.0})
 
 
 def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):
@@ -307,3 +271,11 @@ def test_functions_records_and_redeclared_models_compute_as_python_does():
     again = simulate(whole(around=dict(wind=0.0)))
     assert again["plain.x"][-1] < x[-1]
     assert simulate(whole(), parameters={"g.limits": [-0.5, 0.6]})["plain.x"][-1] > x[-1]
+
+
+def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
+    (tmp_path / "levels.mo").write_text(
+        "model Levels type Level = Real(min=0, start=2); Level h[3](each fixed=true); equation der(h) = -h; end Levels;"
+    )
+    levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"](), stop=1.0, tolerance=1e-10)
+    np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)

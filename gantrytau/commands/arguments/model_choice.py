@@ -4,7 +4,7 @@ import importlib
 import inspect
 import typing
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from gantrytau import (
     Connector,
     Model,
     ModelError,
+    ModelicaLibrary,
     check_member,
     load_modelica,
     parameters_of,
@@ -27,6 +28,7 @@ from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
 ROBOT_FILES = (".urdf", ".mjcf", ".xml", ".sdf")
+TEXT = (".mo", ".mop")  # files of Modelica and of Optimica
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     wanted = _wanted(choice, text, robot)
     if choice.file and choice.file.suffix.lower() in ROBOT_FILES:
         found = _in_robot_file(choice.file, kind)
-    elif choice.file and choice.file.suffix == ".mo":
+    elif choice.file and choice.file.suffix in TEXT:
         found = _in_text(choice.file, choice.name, kind)
     else:
         found = _in_file(choice.file, choice.name, kind) if choice.file else _by_name(choice, kind)
@@ -93,16 +95,18 @@ def build(text: str, robot: str | None = None, settings: Sequence[str] = (), kin
     else:
         chosen = _made(found, wanted, _keywords(found, choice))
     model = chosen.model
-    for name, value in _settings(settings, chosen.prototype):
+    in_text = choice.file is not None and choice.file.suffix == ".mo"
+    for name, value in _settings(settings, chosen.prototype, in_text):
         with refusing("--set "):
             model = with_setting(model, name, value)
     return Chosen(model, chosen.prototype)
 
 
-def _settings(settings: Sequence[str], made_from: str | None) -> Iterator[tuple[str, Any]]:
+def _settings(settings: Sequence[str], made_from: str | None, in_text: bool) -> Iterator[tuple[str, Any]]:
     """Name and value of each `--set NAME=VALUE`, and of all that a file holds for `--set FILE.toml`.
 
-    made_from: the prototype of the model; a file that says it belongs to another one is taken, with a warning.
+    made_from: the prototype of the model; a file that says it belongs to another one is taken, with a warning. in_text:
+    whether the model is Modelica text, whose choices have names.
     """
     for setting in settings:
         if setting.endswith(".toml") and "=" not in setting:
@@ -114,7 +118,7 @@ def _settings(settings: Sequence[str], made_from: str | None) -> Iterator[tuple[
             yield from values.items()
         else:
             name, value = split("--set", setting)
-            yield name, number("--set", name, value)
+            yield name, number("--set", name, value, words=in_text)
 
 
 def _wanted(choice: NamedObject, text: str, robot: str | None) -> str | None:
@@ -236,15 +240,24 @@ def _in_robot_file(file: Path, kind: Kind) -> type[Model]:
 
 
 def _in_text(file: Path, name: str, kind: Kind) -> Any:
-    """The class of a Modelica file; without a name, the only model in it."""
-    library = load_modelica(file)
-    models = [one for one in library.names if library.kind_of(one) in ("model", "block")]
+    """The class of a file of Modelica or Optimica; without a name, the only one in it of the kind."""
+    library = _text_loader(file)(file)
+    wanted = ("optimization",) if kind is PROBLEM else ("model", "block")
+    models = [one for one in library.names if library.kind_of(one) in wanted]
     if not name and len(models) != 1:
-        what = f"several models ({', '.join(models)})" if models else "no model"
+        what = f"several {kind.word}s ({', '.join(models)})" if models else f"no {kind.word}"
         raise CommandError(
-            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), 'Model')}"
+            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), kind.word.title())}"
         )
     return _checked(library[name or models[0]], f"{file.name}:{name}", kind)
+
+
+def _text_loader(file: Path) -> Callable[..., ModelicaLibrary]:
+    if file.suffix == ".mo":
+        return load_modelica
+    from gantrytau_optimica import load_optimica  # which is not needed by most commands
+
+    return load_optimica
 
 
 def _checked(found: Any, name: str, kind: Kind) -> Any:

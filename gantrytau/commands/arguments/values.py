@@ -31,8 +31,11 @@ def pairs(option: str, texts: Iterable[str] | None) -> dict[str, Any]:
     }
 
 
-def number(option: str, name: str, text: str) -> Any:
-    """A number, a truth value, a vector such as `[1, 2, 3]`, or a text with a unit; CommandError for all else."""
+def number(option: str, name: str, text: str, *, words: bool = False) -> Any:
+    """A number, a truth value, a vector such as `[1, 2, 3]`, or a text with a unit; CommandError for all else.
+
+    words: a name is a value, too, as that of a choice in Modelica text.
+    """
     try:
         value = {"true": True, "false": False}.get(text.lower())
         value = ast.literal_eval(text) if value is None else value
@@ -42,6 +45,8 @@ def number(option: str, name: str, text: str) -> Any:
         value = list(value)
     if value is None and _VALUE.match(text):
         return with_unit(f"{option} {name}={text}", text)
+    if words and re.fullmatch(r"[A-Za-z_][\w.]*", text) and value is None:
+        return text
     if value is None or not _numeric(value):
         raise CommandError(
             f"{option} {name}={text}: expected a number as 2.5, one with its unit as '700 mm', a vector as '[1, 2, 3]', "

@@ -112,7 +112,7 @@ def _inherited(kind: Any) -> Iterator[tuple[str, str]]:
     bases = [base for base in kind.__mro__[1:] if getattr(base, "members", None)]
     told, seen = [], set(vars(kind))
     for base in bases:
-        if base.__module__ == "gantrytau.language.model":
+        if base.__module__ in ("gantrytau.language.model", "gantrytau.modelica.elaboration.classes"):
             continue
         held = [name for name in base.members() if name in vars(base)]
         kept = [name for name in held if name not in seen]
@@ -166,7 +166,7 @@ def _settings(kind: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for base in reversed(kind.__mro__):
         found |= {n: v for n, v in vars(base).items() if is_setting(v, n) and n not in HIDDEN}
-    return {n: v for n, v in found.items() if n not in kind.members()}
+    return {n: v for n, v in found.items() if n not in kind.members() and is_setting(getattr(kind, n), n)}
 
 
 def _settings_of(part: PlacedPart) -> Iterator[Listing]:

@@ -11,9 +11,11 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
+from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import Items, looped
 from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.table_functions import external_value
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -24,10 +26,14 @@ class LeftBlock(Exception):
 
 @dataclass
 class Execution:
-    """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before."""
+    """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before.
+
+    shapes: the sizes of what is declared with sizes.
+    """
 
     reader: Interpreter
     known: dict[str, Any] = field(default_factory=dict)
+    shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def run(self, items: Items, local: Mapping[str, Any] | None = None) -> None:
         """Carry out statements, one after another; local: values of the iterators around them."""
@@ -53,7 +59,8 @@ class Execution:
 
     def _call(self, item: tree.ProcedureCall, reader: Interpreter) -> None:
         if item.call.function.parts[-1][0] != "assert":
-            reader.scope.refuse(item.at, "found the call of a function whose results are lost, expected ':='")
+            reader.results(item.call)
+            return
         holds = reader.value(item.call.arguments[0])
         if not isinstance(holds, ca.SX) and not holds:
             reader.scope.refuse(item.at, f"found what does not hold: {reader.value(item.call.arguments[1])}")
@@ -62,9 +69,7 @@ class Execution:
         value = reader.results(item.value)
         found = value if isinstance(value, tuple) else (value,)
         if len(item.targets) > len(found):
-            reader.scope.refuse(
-                item.at, f"found {len(item.targets)} names to assign to, expected at most {len(found)}"
-            )
+            reader.scope.refuse(item.at, f"found {len(item.targets)} names to assign, expected {len(found)}")
         for target, one in zip(item.targets, found, strict=False):
             if target is not None:
                 name = target.parts[0][0]
@@ -74,10 +79,36 @@ class Execution:
                         target.at,
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
+                wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
+                kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
+                if not fits(wanted, kind):
+                    reader.scope.refuse(target.at, f"found {kind} for '{name}', expected {wanted}")
                 try:
+                    if target.parts == ((name, ()),):
+                        self._check_shape(name, one)
                     self.known[name] = _with(self.known[name], target.parts, one, reader)
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
+
+    def _check_shape(self, name: str, value: Any) -> None:
+        shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
+        if shape is not None and isinstance(value, plain) and np.shape(values.boxed(value)) != shape:
+            wanted = values.sized(np.empty(shape))
+            words = f"found {values.sized(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
+            raise ModelError(words)
+
+    def declare(self, name: str, element: Element, value: Any) -> None:
+        """Let a variable of a function have a value; ModelError for one of another type or size than is declared."""
+        self.known[name] = value
+        reader = replace(self.reader, scope=element.scope, local={**self.reader.local, **self.known})
+        sizes = [*element.declaration.subscripts, *element.clause.subscripts]
+        wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
+        if not fits(wanted, kind := type_of_value(value)):
+            raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
+        if not any(isinstance(one, tree.Mark) for one in sizes) and not _is_array_type(element):
+            self.shapes[name] = tuple(reader.value(one) for one in sizes)
+            if value is not None:
+                self._check_shape(name, value)
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
         for inner in looped(item, reader):
@@ -106,9 +137,7 @@ class Execution:
                 if str(left) == "return":
                     raise
                 return
-        self.reader.scope.refuse(
-            item.at, f"found a loop of more than {MOST_ROUNDS} rounds, expected one that ends"
-        )
+        self.reader.scope.refuse(item.at, f"found a loop of {MOST_ROUNDS} rounds, expected one that ends")
 
     def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
         """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
@@ -152,17 +181,13 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
         return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
     if rest or not isinstance(old, np.ndarray):
-        raise ModelError(
-            "found an element of what is no array of a known size assigned, expected an array of numbers"
-        )
+        raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()
     places = tuple(reader.places(one, size) for one, size in zip(subscripts, old.shape, strict=True))
     many = [place if isinstance(place, list) else [place] for place in places]
     shape = tuple(len(place) for place in places if isinstance(place, list))
     if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
-        raise ModelError(
-            f"found the size {values.size_words(new)} assigned to {list(shape)}, expected one size"
-        )
+        raise ModelError(f"found {values.size_words(new)} assigned to {list(shape)}, expected one size")
     flat = iter(new.flat) if isinstance(new, np.ndarray) else iter([new])
     for index in np.ndindex(*map(len, many)):
         found[tuple(axis[k] for axis, k in zip(many, index, strict=True))] = next(flat)
@@ -171,26 +196,28 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
 
 def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
     """The equations that an algorithm of a model amounts to: one for each variable that it assigns."""
-    run = Execution(reader, dict.fromkeys(_assigned(items)))
+    names = dict.fromkeys(assigned(items))
+    run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
     run.run(items)
     for name, value in run.known.items():
         left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
         if right is None:
             raise ModelError(
-                f"found '{name}' without a value at the end of an algorithm, expected one in each branch"
+                f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
         yield ca.SX(left) == right
 
 
-def _assigned(items: Items) -> Iterator[str]:
+def assigned(items: Items) -> Iterator[str]:
+    """Names of the variables that statements set."""
     for item in items:
         if isinstance(item, tree.Assignment):
             yield from (target.parts[0][0] for target in item.targets if target is not None)
         elif isinstance(item, (tree.ForLoop, tree.WhileLoop)):
-            yield from _assigned(item.items)
+            yield from assigned(item.items)
         elif isinstance(item, tree.Branching):
             for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from _assigned(inner)
+                yield from assigned(inner)
 
 
 def called_class(
@@ -202,15 +229,14 @@ def called_class(
 ) -> Any:
     """The value of a function, several as a tuple, or of the constructor of a record."""
     definition = scope.definition
-    record = definition.kind == "record"
+    if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
+        scope = made
+    record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
     external = definition.body.external if isinstance(definition.body, tree.Composition) else None
-    if external is not None and external.language != "builtin":
-        raise ModelError(
-            f"found {scope.name}, an external function, which is not supported; write an algorithm"
-        )
-    inputs = {n: e for n, e in scope.elements.items() if record or "input" in e.clause.prefixes}
+    whole = definition.kind == "record"
+    inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
     mapped = next((n for n, one in given.items() if not record and _is_longer(inputs[n], one)), None)
     if mapped is not None:
@@ -219,13 +245,20 @@ def called_class(
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, constants) for one in all_given]
         return values.array(each)
-    if external is not None:
+    if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
     run = Execution(Interpreter(scope, constants, beyond), {})
-    for name, element in scope.elements.items():
-        run.known[name] = given[name] if name in given else _initial(name, element, run, name in inputs)
+    for name, element in (scope.elements if external is None and not record else inputs).items():
+        run.declare(
+            name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
+        )
     if record:
         return RecordValue(run.known)
+    if external is not None:
+        reader = replace(run.reader, local=run.known)
+        return external_value(
+            external.function or definition.name, [reader.value(e) for e in external.arguments]
+        )
     try:
         for section in scope.sections:
             run.reader = replace(run.reader, scope=section.scope)
@@ -234,10 +267,10 @@ def called_class(
         pass
     outputs = [n for n, e in scope.elements.items() if "output" in e.clause.prefixes]
     missing = next((n for n in outputs if _is_open(run.known[n])), None)
-    if missing is not None or not outputs:
+    if missing is not None:
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
-    return found if len(found) > 1 else first_result(found)
+    return found if len(found) != 1 else first_result(found)
 
 
 def _is_open(value: Any) -> bool:
@@ -270,9 +303,7 @@ def _given(
     found = dict(zip(inputs, arguments, strict=False))
     for name, one in named.items():
         if name not in inputs:
-            raise ModelError(
-                f"found the argument '{name}', which {scope.name} does not have{did_you_mean(name, inputs)}"
-            )
+            raise ModelError(f"found '{name}', which {scope.name} does not take{did_you_mean(name, inputs)}")
         if name in found:
             raise ModelError(f"found two values for '{name}' of {scope.name}, expected one")
         found[name] = one

@@ -1,43 +1,49 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import casadi as ca
+
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
+from gantrytau.language.events import WhenChain
 from gantrytau.language.model import Connector, Declared, Model, Outer
+from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged
-from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
+from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.placed import AT_START, Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
+from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
+    BEFORE,
     AbsentComponent,
+    at_start,
     first_valued,
+    instants,
     remembers,
     sample_calls,
     stated,
 )
-from gantrytau.modelica.elaboration.structure import ClassMember, Structure, plain
-
-CLASSES = ("model", "block", "connector", "record", "class")
-TAKEN = {
-    "equations",
-    "initial_equations",
-    "members",
-    "modified",
-    "modifications",
-    "chosen_starts",
-    "shaped",
-    "structure",
-}
+from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.references import nodes_of
 
 
 class TextClass(Declared):
-    """What classes of Modelica text have in common. structure: of an instance without modifications."""
+    """What classes of Modelica text have in common.
+
+    structure: of an instance without modifications; _kinds: the restricted classes of which it is made; _taken: names that
+    no component may have.
+    """
 
     structure: ClassVar[Structure]
+    _kinds: ClassVar[frozenset[str]] = frozenset({"model", "block", "connector", "record", "class"})
+    _taken: ClassVar[frozenset[str]] = frozenset(
+        {"equations", "initial_equations", "members", "modified"}
+        | {"modifications", "chosen_starts", "shaped", "structure"}
+    )
     first_index = 1
     checks_units = False
 
@@ -66,6 +72,11 @@ class ModelicaModel(TextClass, Model):
 
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
+        if AT_START in type(self).members():
+            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+        for name, one in self.structure.members.items():
+            if one.present and one.is_solved and 0 not in one.shape:
+                yield der(getattr(self, name)) == 0
 
     def initial_equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=True)
@@ -83,9 +94,7 @@ def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str
         if one is None or not one.present:
             continue
         if one.own.final:
-            raise ModelError(
-                f"{structure.scope.name}: found a modification of '{name}', which is final, expected none"
-            )
+            raise ModelError(f"{structure.scope.name}: found '{name}' modified, which is final")
         value = given if isinstance(given, Mapping) else getattr(given, "value", given)
         if one.primitive is not None and one.is_folded:
             if isinstance(value, (bool, int, float, str)) and value != _known(one):
@@ -103,7 +112,8 @@ def _known(one: ClassMember) -> Any:
 def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     """The class of a structure all of whose sizes and conditions have been asked for; base: one it is a variant of."""
     scope = structure.scope
-    _refuse_kind(structure)
+    kind: type[Any] = base or (ModelicaConnector if _is_connector(structure) else ModelicaModel)
+    _refuse_kind(structure, kind._kinds)
     body: dict[str, Any] = {
         "__module__": Path(scope.source.name).name,
         "structure": structure,
@@ -112,12 +122,12 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     held = set(_held(structure))
     before = dict(_first_values(structure, held))
     for name, one in structure.members.items():
-        if name in TAKEN or name.startswith("_"):
+        if name in kind._taken or name.startswith("_"):
             scope.refuse(
                 one.element.declaration.at,
                 f"found a component '{name}', a name that is taken, expected another name",
             )
-        if not one.present:
+        if not one.present or one.is_object:
             body[name] = None
         elif "outer" in one.prefixes and "inner" not in one.prefixes:
             body[name] = Outer(Declared, name)
@@ -127,55 +137,67 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             body[name] = _component(one)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
-        start = Modifier(call.arguments[0], scope)
-        body[sample_name(call)] = Discrete(
-            Bound(start, structure), unit="s", description="next instant of sample()"
-        )
+        known = structure.is_fixed(call.arguments[0])  # else it is set at the start
+        start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
+        body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
+    if _asks_for_start(structure):
+        body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
-        return type(scope.definition.name, (base or ModelicaConnector,), body)
+        return type(scope.definition.name, (kind,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)
-    return type(scope.definition.name, (base or ModelicaModel,), body)
+    return type(scope.definition.name, (kind,), body)
+
+
+def _asks_for_start(structure: Structure) -> bool:
+    """Whether `initial()` stands elsewhere than alone as a condition of `when`."""
+    alone = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    nodes = (node for section in structure.scope.sections for node in nodes_of(section.items))
+    calls = (one for one in nodes if isinstance(one, tree.Call) and id(one) not in alone)
+    return any(one.function.parts[0][0] == "initial" for one in calls)
 
 
 def _is_connector(structure: Structure) -> bool:
     return structure.scope.definition.kind == "connector"
 
 
-def _refuse_kind(structure: Structure) -> None:
+def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in CLASSES or "operator" in definition.prefixes:
+    if definition.kind not in kinds or "operator" in definition.prefixes:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif "expandable" in definition.prefixes:
         found = "an expandable connector, which is not supported, expected one with declared members"
     elif streams:
         found = f"the stream variable '{streams[0]}', which is not supported, expected potentials and flows"
-    elif any(base.definition.name == "ExternalObject" for base, _ in structure.scope.bases):
+    elif structure.scope.is_external_object:
         found = f"{name}, an external object, which is not supported, expected equations"
     else:
         return
     structure.scope.refuse(definition.at, f"found {found}")
 
 
-def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Modifier]]:
+def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple[str, Bound]]:
     """Names and values of the initial equations of what a `when` sets, as `pre(x) = 1` or `x = 1`."""
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
             if name in held and isinstance(item, tree.SimpleEquation):
                 structure.started.append(item)
-                yield name, Modifier(item.right, section.scope, at=item.at)
+                yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
 def _held(structure: Structure) -> Iterator[str]:
     """Names of what a `when` sets."""
-    for section in structure.scope.sections:
-        switches = [item for item in section.items if section.kind == "equation" and remembers(item)]
-        yield from (
-            item.left.parts[0][0] for item in switches if isinstance(item.left, tree.ComponentReference)
-        )
+    asked = _asked_before(structure)
+    for section in _all_sections(structure):
+        for item in section.items if section.kind == "equation" else ():
+            left = item.left if isinstance(item, tree.SimpleEquation) else None
+            if isinstance(left, tree.ComponentReference) and (
+                remembers(item, structure) or left.parts[0][0] in asked
+            ):
+                yield left.parts[0][0]
     for item in _whens(structure):
         for _, items in item.branches:
             left = list(items)
@@ -187,6 +209,30 @@ def _held(structure: Structure) -> Iterator[str]:
                     for each in target.items if isinstance(target, tree.OutputList) else (target,):
                         if isinstance(each, tree.ComponentReference):
                             yield each.parts[0][0]
+
+
+def _asked_before(structure: Structure) -> set[str]:
+    """Names of the Booleans whose values before an instant are asked for."""
+    tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
+    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in BEFORE]
+    names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
+    known = (structure.members.get(name) for name in names)
+    return {
+        one.name for one in known if one and one.kind == "Boolean" and not one.is_parameter and not one.shape
+    }
+
+
+def _all_sections(structure: Structure) -> Iterator[StatementSection]:
+    """The sections of a class, and an equation for each value of a Boolean that is asked for before an instant."""
+    yield from structure.scope.sections
+    for one in map(structure.members.__getitem__, sorted(_asked_before(structure))):
+        said = one.own
+        if said.value is not None and one.over.value is None:
+            name = tree.ComponentReference(said.at, ((one.name, ()),))
+            found = tree.SimpleEquation(said.at, None, None, "=", name, said.value)
+            yield StatementSection("equation", (found,), said.scope)
 
 
 def _whens(structure: Structure) -> Iterator[tree.Branching]:
@@ -212,7 +258,7 @@ def _component(one: ClassMember) -> Any:
     def element(index: int) -> Any:
         child = one.children[index]
         made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index), owner))
+        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
 
     found = Array(Declared, 0)
     found.elements = [element(k) for k in range(one.shape[0])]
@@ -260,12 +306,29 @@ def experiment_of(structure: Structure) -> dict[str, float]:
 def _sections(instance: Any, initial: bool) -> Iterator[Any]:
     """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
-    for section in structure.scope.sections:
-        if section.kind.startswith("initial") != initial:
+    held, firsts = set(_held(structure)), []
+    for section in sorted(_all_sections(structure), key=lambda one: one.kind != "initial algorithm"):
+        sets_held = section.kind == "initial algorithm" and held.issuperset(assigned(section.items))
+        if section.kind == "constraint" or (section.kind.startswith("initial") and not sets_held) != initial:
             continue
         read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
         items = [one for one in section.items if not any(one is other for other in structure.started)]
         try:
-            yield from read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
+            found = read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
+            if sets_held:
+                firsts += found
+            else:
+                yield from (_begun(one, firsts) for one in found)
         except AbsentComponent as error:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None
+
+
+def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
+    """A statement; a chain of `when` also gives what it sets the values of initial algorithms."""
+    if not isinstance(stated, WhenChain) or not firsts:
+        return stated
+    actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]
+    names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
+    scalars = (scalar for one in firsts for scalar in one.elements())
+    own = tuple(one for one in scalars if one.dep(0).name() in names)
+    return WhenChain((at_start(own), *stated.branches)) if own else stated

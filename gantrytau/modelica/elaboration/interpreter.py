@@ -14,6 +14,8 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
 
+FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
+
 
 class Members(Protocol):
     """An instance of a class: a component, a package with its constants, or what a function computes with."""
@@ -24,7 +26,6 @@ class Members(Protocol):
 
     def member(self, name: str) -> Any:
         """The value of a component."""
-        ...
 
     def names(self) -> Sequence[str]:
         """Names of its components."""
@@ -32,11 +33,16 @@ class Members(Protocol):
 
     def shape(self, name: str) -> tuple[int, ...] | None:
         """The sizes of a component; None where only its value has them."""
-        ...
 
     def next_sample(self, call: tree.Call) -> Any:
-        """The next instant of a `sample`."""
+        """The next instant of a `sample`; of `initial()` whether it is the start, 1 or 0."""
+
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
         ...
+
+    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+        """The least and the greatest value of an Integer; None for a Boolean."""
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         """Whether it holds parameters and constants only."""
@@ -52,19 +58,19 @@ class Surroundings(Protocol):
 
     def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
         """The value of a function, or of the constructor of a record; several results as a tuple."""
-        ...
 
 
 def first_result(value: Any) -> Any:
     """The first of several results of a function, which is its value in an expression."""
-    return next(iter(value)) if isinstance(value, tuple) else value
+    return next(iter(value), None) if isinstance(value, tuple) else value
 
 
 @dataclass(frozen=True, eq=False)
 class Interpreter:
     """Evaluates expressions of a class in an instance.
 
-    local: values of iterators and of what a function computes; end: the size that `end` means; quiet: no events.
+    local: values of iterators and of what a function computes; end: the size that `end` means; quiet: no events;
+    settled: values before an instant are those behind it.
     """
 
     scope: ClassScope
@@ -73,6 +79,7 @@ class Interpreter:
     local: Mapping[str, Any] = field(default_factory=dict)
     end: int | None = None
     quiet: bool = False
+    settled: bool = False
 
     def with_local(self, **values: Any) -> "Interpreter":
         """The same with further iterators."""
@@ -92,15 +99,7 @@ class Interpreter:
             raise
         except ModelError as error:
             self.scope.refuse(expression.at, str(error))
-        except (
-            RuntimeError,
-            TypeError,
-            NotImplementedError,
-            ValueError,
-            IndexError,
-            KeyError,
-            ArithmeticError,
-        ) as error:
+        except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
     def _number(self, e: tree.Number) -> Any:
@@ -125,15 +124,16 @@ class Interpreter:
         return values.unary(e.operator, self.value(e.operand))
 
     def _binary(self, e: tree.Binary) -> Any:
-        return values.binary(e.operator, self.value(e.left), self.value(e.right))
+        left = self.value(e.left)
+        if e.operator in ("and", "or") and left is (e.operator == "or"):
+            return left  # the other side may have no value
+        return values.binary(e.operator, left, self.value(e.right))
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
         step = self.value(e.step) if e.step is not None else 1
         if not all(map(values.is_number, (start, stop, step))):
-            raise ModelError(
-                "found a range of variables, expected one that is known when the model is translated"
-            )
+            raise ModelError("found a range of variables, expected one that is known at translation")
         count = int(np.floor((stop - start) / step + 1e-9)) + 1
         return values.array([start + k * step for k in range(max(count, 0))])
 
@@ -219,20 +219,15 @@ class Interpreter:
         found = here.first(parts[0][0])
         if found is None:
             name, near = parts[0][0], [*self.local, *self.members.names(), *self.scope.known_names()]
-            raise ModelError(
-                f"found the name '{name}', expected one that is declared{did_you_mean(name, near)}"
-            )
+            raise ModelError(f"found the name '{name}', expected a declared one{did_you_mean(name, near)}")
         parts = parts[1:]
         while parts and (inner := found.inherited_class(parts[0][0])) is not None:
             found, parts = inner, parts[1:]
         literals = found.literals
         if not parts:
             if literals is not None:
-                return (
-                    values.array([EnumerationValue(k + 1, n, found.name) for k, n in enumerate(literals)]),
-                    (),
-                    [],
-                )
+                every = [EnumerationValue(k + 1, n, found.name) for k, n in enumerate(literals)]
+                return values.array(every), (), []
             raise ModelError(f"found the class {found.name}, expected a value")
         name = parts[0][0]
         if literals is not None and name in literals:
@@ -248,7 +243,7 @@ class Interpreter:
         name, (subscripts, *rest) = element.declaration.name, (parts[0][1], *parts[1:])
         if not {"constant", "parameter"} & set(element.clause.prefixes):
             raise ModelError(
-                f"found '{name}' of {owner.name}, which lies around this class, expected a constant"
+                f"found '{name}' of {owner.name}, which is around this class, expected a constant"
             )
         return self.library.package(owner).member(name), subscripts, rest
 
@@ -266,9 +261,7 @@ class Interpreter:
                 return value.member(name)
         else:
             known = ()
-        raise ModelError(
-            f"found the name '{name}' behind a dot, expected a member{did_you_mean(name, known)}"
-        )
+        raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
 
     def indexed(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
         """The elements of an array or list that subscripts choose."""
@@ -277,9 +270,7 @@ class Interpreter:
         shape = (
             (len(value),)
             if isinstance(value, list)
-            else np.shape(value)
-            if isinstance(value, np.ndarray)
-            else ()
+            else np.shape(value if isinstance(value, np.ndarray) else 0)
         )
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
@@ -297,9 +288,7 @@ class Interpreter:
             return list(range(size))
         found = replace(self, end=size).value(subscript)
         if isinstance(found, ca.SX) or not values.is_number(found):
-            raise ModelError(
-                "found a subscript that varies, expected one that is known when the model is translated"
-            )
+            raise ModelError("found a subscript that varies, expected one that is known at translation")
         numbers = list(found) if isinstance(found, np.ndarray) else [found]
         wrong = next((n for n in numbers if int(n) != n or not 1 <= n <= size), None)
         if wrong is not None:
@@ -322,17 +311,29 @@ class Interpreter:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
             return time >= self.members.next_sample(e)
-        keyword = name in ("der", "pure", "initial")
-        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
-        found = None if keyword else start.first(first.split(".")[0])
+        if self.settled and name in ("pre", "edge", "change"):
+            return self.value(e.arguments[0]) if name == "pre" else False
+        if name == "initial":
+            return self.members.next_sample(e) > 0.5
+        name, function = self.function(e)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
-        if found is None and name == "pure":
-            return arguments[0]
-        name = name.removeprefix(".") if found is None or found.predefined else name
-        if "." not in name and (found is None or found.predefined):
-            return values.called(name, arguments, named)
-        return self.library.call(self.scope.find_class(name, e.at), arguments, named)
+        if function is not None:
+            return self.library.call(function, arguments, named)
+        if self.members.has(name):
+            raise ModelError(
+                f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
+            )
+        return arguments[0] if name == "pure" else values.called(name, arguments, named)
+
+    def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
+        """The name of the function that is called, and its class; None for one of the language."""
+        name = ".".join(part for part, _ in e.function.parts)
+        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
+        found = None if name in ("der", "pure", "initial") else start.first(first.split(".")[0])
+        if "." not in first and (found is None or found.predefined):
+            return first, None
+        return name, self.scope.find_class(name, e.at)
 
     def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
         """The sizes of a component by its plain name, which say nothing of its value; None for all else."""

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
@@ -12,6 +12,7 @@ from gantrytau.modelica.elaboration.classes import class_of
 from gantrytau.modelica.elaboration.modifiers import NOTHING
 from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.structure import Structure
+from gantrytau.modelica.optimizations import with_parameters
 from gantrytau.modelica.parser import parse, read_tree
 from gantrytau.modelica.source import SourceText
 
@@ -20,17 +21,27 @@ type Real end Real; type Integer end Integer; type Boolean end Boolean; type Str
 partial class ExternalObject end ExternalObject;
 type StateSelect = enumeration(never, avoid, default, prefer, always);
 type AssertionLevel = enumeration(warning, error);
+partial class OptimizationHorizon
+  parameter Real startTime(unit="s") = 0 "when it begins";
+  parameter Real finalTime(unit="s") = 1 "when it ends";
+end OptimizationHorizon;
 """
+FORMER = {  # names of the Modelica Standard Library before version 4
+    "Modelica.SIunits": "Modelica.Units.SI",
+    "Modelica.Units.SI.Conversions": "Modelica.Units.Conversions",
+    "Modelica.Units.Conversions.NonSIunits": "Modelica.Units.NonSI",
+    "Modelica.Units.SI.Temp_K": "Modelica.Units.SI.Temperature",
+    "Modelica.Units.SI.Temp_C": "Modelica.Units.NonSI.Temperature_degC",
+}
 
 
 class ModelicaLibrary:
     """Classes of Modelica text: `library["Package.Model"]` is a class as any other Model; keywords modify it."""
 
+    kinds: ClassVar[tuple[str, ...]] = ("model", "block", "connector", "record", "class")  # that are named
+
     def __init__(self, paths: Sequence[Path], libraries: Sequence[Path]):
-        top = tree.ClassDefinition(
-            0, None, None, (), "package", "", tree.Composition(0, False, None, (), None), None
-        )
-        self.root = ClassScope(top, SourceText("Modelica", ""), None)
+        self.root = ClassScope(_empty_package(""), SourceText("Modelica", ""), None)
         predefined = parse(SourceText("Modelica", PREDEFINED))
         for one in predefined.classes:
             made = ClassScope(one, predefined.source, self.root, predefined=one.kind == "type")
@@ -56,9 +67,7 @@ class ModelicaLibrary:
         for one in found:
             around = one.around or self.root
             if one.definition.name in around.classes:
-                one.refuse(
-                    one.definition.at, f"found a second class {one.name}, expected one; leave one file out"
-                )
+                one.refuse(one.definition.at, f"found a second class {one.name}, expected one")
             around.classes[one.definition.name] = one
         return [one.name for one in found]
 
@@ -68,8 +77,7 @@ class ModelicaLibrary:
         left = [self.root.find_class(name, 0) for name in self.given]
         for one in left:
             left += [inner for inner in one.classes.values() if inner.around is one]
-        kinds = ("model", "block", "connector", "record", "class")
-        return tuple(sorted(one.name for one in left if one.definition.kind in kinds))
+        return tuple(sorted(one.name for one in left if one.definition.kind in self.kinds))
 
     def kind_of(self, name: str) -> str:
         """The word before the name of a class: model, block, connector, ...; "" for a partial one."""
@@ -88,12 +96,16 @@ class ModelicaLibrary:
                 raise ModelError(f"found the name '{name}', expected a class{did_you_mean(name, self.names)}")
             if "partial" in scope.definition.prefixes:
                 scope.refuse(
-                    scope.definition.at, f"found {name}, which is partial, expected a class that extends it"
+                    scope.definition.at, f"found {name}, which is partial, expected one that extends it"
                 )
             structure = Structure(scope, NOTHING, self)
             structure.prepare()
-            self._classes[name] = class_of(structure)
+            self._classes[name] = self.class_of(structure)
         return self._classes[name]
+
+    def class_of(self, structure: Structure) -> type[Any]:
+        """The class of a structure that is prepared."""
+        return class_of(structure)
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
@@ -110,6 +122,9 @@ class ModelicaLibrary:
         return called_class(scope, arguments, named, self, self.package(scope))
 
 
+Library = TypeVar("Library", bound=ModelicaLibrary)
+
+
 def load_modelica(
     *paths: str | os.PathLike[str], libraries: Iterable[str | os.PathLike[str]] = ()
 ) -> ModelicaLibrary:
@@ -118,9 +133,20 @@ def load_modelica(
     paths: `.mo` files, and folders of packages; libraries: folders in which packages are looked for by name when a class
     needs them, those of MODELICAPATH too. Raises ModelError with file, line and column for what is no Modelica.
     """
+    return loaded(ModelicaLibrary, "load_modelica('robot.mo')", paths, libraries)
+
+
+def loaded(
+    made: type[Library],
+    example: str,
+    paths: Sequence[str | os.PathLike[str]],
+    libraries: Iterable[str | os.PathLike[str]],
+) -> Library:
+    """The classes of files and folders as a library of this kind; example: of a call, for messages."""
     if not paths:
-        raise ModelError("load_modelica: found no file, expected at least one, as load_modelica('robot.mo')")
-    given = [Path(p) for p in ([libraries] if isinstance(libraries, str | os.PathLike) else libraries)]
+        raise ModelError(f"{example.partition('(')[0]}: found no file, expected at least one, as {example}")
+    several = isinstance(libraries, Iterable) and not isinstance(libraries, str)
+    given = [_path(p, example) for p in (libraries if several else [libraries])]
     others = [Path(p) for p in os.environ.get("MODELICAPATH", "").split(os.pathsep) if p]
     for folder in given:
         if not folder.is_dir():
@@ -129,9 +155,22 @@ def load_modelica(
                 place=str(folder),
                 argument="libraries",
             )
-    return ModelicaLibrary(
-        [Path(p) for p in paths], [*given, *(folder for folder in others if folder.is_dir())]
+    return made(
+        [_path(p, example) for p in paths], [*given, *(folder for folder in others if folder.is_dir())]
     )
+
+
+def _path(given: Any, example: str) -> Path:
+    if not isinstance(given, (str, os.PathLike)):
+        raise ModelError(
+            f"{example.partition('(')[0]}: found {given!r}, expected the path of a file or folder"
+        )
+    return Path(given)
+
+
+def _empty_package(name: str) -> tree.ClassDefinition:
+    body = tree.Composition(0, False, None, (), None)
+    return tree.ClassDefinition(0, None, None, (), "package", name, body, None)
 
 
 def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
@@ -141,12 +180,11 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     for part in (found.within or "").split(".") if found.within else ():
         inner = around.own_class(part)
         if inner is None:  # the package itself is not given
-            name = tree.ClassDefinition(
-                0, None, None, (), "package", part, tree.Composition(0, False, None, (), None), None
-            )
-            inner = around.classes[part] = ClassScope(name, found.source, around)
+            inner = around.classes[part] = ClassScope(_empty_package(part), found.source, around)
         around = inner
-    return [ClassScope(one, found.source, around) for one in found.classes]
+    optimica = found.source.optimica
+    classes = [with_parameters(one, found.source) if optimica else one for one in found.classes]
+    return [ClassScope(one, found.source, around) for one in classes]
 
 
 def package_in(folder: Path, around: ClassScope) -> ClassScope:
@@ -161,7 +199,7 @@ def package_in(folder: Path, around: ClassScope) -> ClassScope:
             )
         )
     made = ClassScope(definition, found.source, around)
-    made.more = lambda name: _in_folder(folder, name, made)
+    made.more = lambda name: _in_folder(folder, name, made) or _renamed(made, name)
     return made
 
 
@@ -171,6 +209,8 @@ def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None
     if name != "package" and (file := folder / f"{name}.mo").is_file():
         found = read_tree(file)
         return ClassScope(found.classes[0], found.source, around)
+    if next((folder / name).glob("*.mo"), None) is not None:
+        raise ModelError("found a folder without package.mo, expected one", place=str(folder / name))
     return None
 
 
@@ -182,3 +222,25 @@ def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassSc
         if (found := _in_folder(folder, name, root)) is not None:
             return found
     return None
+
+
+def _renamed(package: ClassScope, name: str) -> ClassScope | None:
+    """The class of today that a former name in a package means; None where there is none."""
+    if package.name != "Modelica" or f"Modelica.{name}" not in FORMER:
+        return None
+    found = _today(package, f"Modelica.{name}")
+    for former in FORMER:
+        around, _, last = former.rpartition(".")
+        if around == found.name and found.own_class(last) is None:
+            found.classes[last] = _today(package, former)
+    return found
+
+
+def _today(package: ClassScope, former: str) -> ClassScope:
+    _, *path = FORMER[former].split(".")
+    found: ClassScope | None = package
+    for part in path:
+        found = found.inherited_class(part) if found else None
+    if found is None:
+        raise KeyError(FORMER[former])
+    return found

@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.values import RecordValue
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,8 +23,8 @@ class Modifier:
     """What is said of a component: its value, and what is said of its members and attributes, by name.
 
     value: an expression or a plain value, of which `scope` is the class of its names and `node` the instance, where that
-    is not the one that declares the component; path: the indices and members that choose what is meant in the value; at:
-    its offset in the text of `scope`.
+    is not the one that declares the component; path: what chooses the part of the value that is meant: names of members, and
+    indices with the number of elements; at: its offset in the text of `scope`.
     """
 
     value: Any = None
@@ -32,7 +35,7 @@ class Modifier:
     inner: Mapping[str, "Modifier"] = field(default_factory=dict)
     redeclared: Redeclared | None = None
     at: int = 0
-    path: tuple[int | str, ...] = ()
+    path: tuple[tuple[int, int] | str, ...] = ()
 
     @property
     def member_clause(self) -> tree.ComponentClause | None:
@@ -40,10 +43,10 @@ class Modifier:
         found = self.redeclared.element if self.redeclared else None
         return found if isinstance(found, tree.ComponentClause) else None
 
-    def of_element(self, index: int) -> "Modifier":
-        """What a modification of an array of components says of one of them."""
-        inner = {name: one if one.each else one.of_element(index) for name, one in self.inner.items()}
-        return replace(self, inner=inner, path=(*self.path, index) if self.value is not None else ())
+    def of_element(self, index: int, count: int) -> "Modifier":
+        """What a modification of an array of so many components says of one of them."""
+        inner = {name: one if one.each else one.of_element(index, count) for name, one in self.inner.items()}
+        return replace(self, inner=inner, path=(*self.path, (index, count)) if self.value is not None else ())
 
     def of_member(self, name: str) -> "Modifier | None":
         """What is said of a member, by a modification or by the value of the whole record."""
@@ -52,6 +55,30 @@ class Modifier:
             return inner
         found = replace(self, inner={}, redeclared=None, each=False, path=(*self.path, name))
         return found if inner is None else merged(inner, found)
+
+    def says_the_same(self, other: "Modifier") -> bool:
+        """Whether another modification has the same text."""
+        inner = self.inner.keys() | other.inner.keys()
+        return self.value == other.value and all(
+            self.inner.get(name, NOTHING).says_the_same(other.inner.get(name, NOTHING)) for name in inner
+        )
+
+    def picked(self, value: Any) -> Any:
+        """The part of its value that indices and names of members choose."""
+        for step in self.path:
+            if isinstance(step, str):
+                value = value[step] if isinstance(value, RecordValue) else value.member(step)
+                continue
+            index, count = step
+            if not isinstance(value, (list, np.ndarray)) or len(value) != count:
+                found = f"{len(value)} values" if isinstance(value, (list, np.ndarray)) else "a scalar"
+                self.scope.refuse(
+                    self.at,
+                    f"found {found} for an array of {count} components, expected one value for each; 'each' before the name "
+                    "takes one value for all",
+                )
+            value = value[index]
+        return value
 
     def seen_from(self, node: Any) -> "Modifier":
         """The same, whose values speak of an instance."""
@@ -106,14 +133,18 @@ def _redeclaration(one: tree.Redeclaration, scope: Any) -> tuple[str, Modifier]:
     return component.name, replace(said, scope=scope, redeclared=whole, at=one.at)
 
 
+def plain(values: Mapping[str, Any]) -> Modifier:
+    """Modifications by plain values, nested as mappings."""
+    inner = {n: plain(v) if isinstance(v, Mapping) else Modifier(value=v) for n, v in values.items()}
+    return Modifier(inner=inner)
+
+
 def merged(above: Modifier, below: Modifier) -> Modifier:
     """One modification over another, which stands further in; ModelError where the inner one is final."""
     if below is NOTHING:
         return above
     if below.final and (above.value is not None or above.redeclared or above.inner):
-        above.scope.refuse(
-            above.at, "found a modification of what is declared 'final', expected none; leave it out"
-        )
+        above.scope.refuse(above.at, "found a modification of what is declared 'final', expected none")
     inner = dict(below.inner)
     for name, one in above.inner.items():
         inner[name] = merged(one, inner[name]) if name in inner else one

@@ -13,13 +13,15 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.statements import AbsentComponent
-from gantrytau.modelica.elaboration.structure import Structure, picked
+from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
+
+AT_START = "initial"  # a keyword, which no component has as its name
 
 
 def sample_name(call: tree.Call) -> str:
-    """The name of the Discrete that holds the next instant of a `sample`."""
-    return f"next_sample_{call.at}"
+    """The name of the Discrete that holds the next instant of a `sample`, or whether it is the start."""
+    return f"next_sample_{call.at}" if call.arguments else AT_START
 
 
 class PlacedMembers:
@@ -40,7 +42,7 @@ class PlacedMembers:
         one = self.structure.members[name] if self.structure else None
         if one is not None and not one.present:
             raise AbsentComponent(f"{name}, whose condition does not hold")
-        if one is not None and one.is_folded:
+        if one is not None and (one.is_folded or one.is_object):
             return self.structure.member(name) if self.structure else None
         if one is not None and 0 in one.shape:
             return np.empty(one.shape, dtype=object) if one.primitive else []
@@ -54,13 +56,19 @@ class PlacedMembers:
     def shape(self, name: str) -> tuple[int, ...] | None:
         return self.structure.shape(name) if self.structure else None
 
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        return "" if self.structure is None else self.structure.type_of(reference)
+
+    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+        return None if self.structure is None else self.structure.limits(reference)
+
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)
         if not hasattr(self.instance, name):
-            raise ModelError("found sample() outside of a condition of 'when', expected it there")
+            raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
         return getattr(self.instance, name)
 
 
@@ -70,11 +78,11 @@ def _by_size(found: ca.SX) -> Any:
 
 
 class Bound(Formula):
-    """What Modelica text says of a value, computed in the instance whose class says it."""
+    """What Modelica text says of a value, computed in the instance whose class says it. shape: of what it is the value."""
 
-    def __init__(self, modifier: Modifier, structure: Structure):
+    def __init__(self, modifier: Modifier, structure: Structure, shape: tuple[int, ...] | None = None):
         super().__init__(None)  # type: ignore[arg-type]
-        self.modifier, self.structure = modifier, structure
+        self.modifier, self.structure, self.shape = modifier, structure, shape
 
     def evaluate(self, scope: Any) -> Any:
         """The value where `scope` is that instance."""
@@ -84,10 +92,15 @@ class Bound(Formula):
             try:
                 found = self.structure.interpreter(self.modifier.scope, placed).value(found)
             except AbsentComponent as error:
-                self.modifier.scope.refuse(
-                    self.modifier.at, f"found {error}, expected a component that is there"
-                )
-        found = values.to_casadi(picked(found, self.modifier.path))
+                self.modifier.scope.refuse(self.modifier.at, f"found {error}, expected one that is there")
+        found = self.modifier.picked(found)
+        shape = np.shape(found) if isinstance(found, np.ndarray) else ()
+        alike = self.shape in (None, shape) or (self.modifier.each and not shape)
+        if not alike and isinstance(self.modifier.value, tree.TreeNode):
+            hint = "" if shape else "; 'each' before the name takes one value for all"
+            words = f"found {values.sized(found)}, expected {values.sized(np.empty(self.shape or ()))}{hint}"
+            self.modifier.scope.refuse(self.modifier.at, words)
+        found = values.to_casadi(found)
         return float(found) if isinstance(found, bool) else found
 
     def parts(self) -> tuple[str, tuple[Any, ...]]:

@@ -18,6 +18,14 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.freedom import (
+    inside_optimization,
+    is_fixed,
+    is_free,
+    refuse_free,
+    without_optimica,
+)
+from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
@@ -28,15 +36,16 @@ TEXTS = {"unit": "unit", "displayUnit": "display"}
 IGNORED = {"quantity", "unbounded"}
 
 
-def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Modifier | None) -> None:
+def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bound | None) -> None:
     """The declaration of a number, Boolean, text or enumeration; nothing for a constant that is no plain value."""
     name, structure = one.name, one.owner
+    refuse_free(one)
     if one.is_folded:
         if one.full.value is not None:
             value = structure.member(name)
             body[name] = value if isinstance(value, (bool, int, float, str)) else None
         return
-    said = _attributes(one, one.own, structure)
+    said = _attributes(one, without_optimica(one, one.own, True), structure)
     words: dict[str, Any] = {"description": one.element.declaration.description or ""}
     words |= {k: v for k, v in said.items() if k not in ("value", "prefer")}
     if 0 in one.shape:
@@ -46,18 +55,28 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Mod
             one.element.declaration.at, f"found {len(one.shape)} dimensions of '{name}', expected at most two"
         )
     if one.is_parameter:
-        for key in ("start", "fixed"):
+        for key in ("start", "fixed", "free"):
             words.pop(key, None)
         fold = _flag(one, "Evaluate")
-        body[name] = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        body[name] = made = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
+        made.final = one.full.final
+        made.free = is_free(one)
         return
+    words.pop("free", None)
+    if "start" not in one.full.inner and is_fixed(one):
+        words.setdefault("start", 0.0)
     if held:
         start = words.pop("start", 0.0)
-        start = Bound(before, structure) if before is not None else start
+        start = before or start
         words.pop("fixed", None)
         body[name] = Discrete(start, shape=one.shape, **words)
         return
-    kind = next((made for word, made in KINDS.items() if word in one.prefixes), Real)
+    words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
+    kind = next((made for word, made in KINDS.items() if word in words_of), Real)
+    if is_free(one):
+        kind = Input
+    elif kind is Input and inside_optimization(structure):
+        kind = Real  # which the equations around it determine
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
@@ -76,7 +95,10 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     """The attributes of a quantity that a modification in a class sets, by the names of the language."""
     found: dict[str, Any] = {}
     if said.value is not None:
-        found["value"] = Bound(said, structure)
+        if not any(isinstance(step, str) for step in said.path):
+            reader = structure.interpreter(said.scope, said.node)
+            check_type(one.type_name, said.value, reader, f"'{one.name}'", said.at)
+        found["value"] = Bound(said, structure, one.shape)
     for name, attribute in said.inner.items():
         if attribute.value is None or name in IGNORED:
             continue
@@ -84,12 +106,12 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
             attribute.scope.refuse(attribute.at, words)
         elif name in NUMBERS:
-            found[name] = Bound(attribute, structure)
+            found[name] = Bound(attribute, structure, one.shape)
         elif name in TEXTS:
             found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
-        elif name == "fixed":
+        elif name in ("fixed", "free"):
             value = structure.folded(attribute.seen_from(structure))
             each = set(np.ravel(value))
             if len(each) > 1:
@@ -100,8 +122,9 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:
             known = (*NUMBERS, *TEXTS, "fixed", "stateSelect", "quantity")
+            known += ("free", "initialGuess") if attribute.scope.source.optimica else ()
             attribute.scope.refuse(
-                attribute.at, f"found '{name}', which {one.kind} does not have{did_you_mean(name, known)}"
+                attribute.at, f"found '{name}', unknown to {one.kind}{did_you_mean(name, known)}"
             )
     if not _has_dimension(found.get("unit", "")):
         found.pop("unit", None)
@@ -138,10 +161,13 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
         if one.primitive is None and not one.shape:
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
-            found[name] = [keywords_of(x, inner.of_element(k), structure) for k, x in enumerate(one.children)]
+            found[name] = [
+                keywords_of(x, inner.of_element(k, len(one.children)), structure)
+                for k, x in enumerate(one.children)
+            ]
         elif not one.is_folded and 0 not in one.shape:
-            attributes = _attributes(one, inner, structure)
-            if one.is_parameter:
-                attributes = {k: v for k, v in attributes.items() if k not in ("start", "fixed")}
+            attributes = _attributes(one, without_optimica(one, inner, False), structure)
+            left_out = ("start", "fixed") if one.is_parameter else ("free",)
+            attributes = {k: v for k, v in attributes.items() if k not in left_out}
             found[name] = attributes
     return {name: one for name, one in found.items() if one}

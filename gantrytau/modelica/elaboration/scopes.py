@@ -1,13 +1,14 @@
 """Where names are looked up (Modelica 3.6, chapter 5): classes, what they inherit and import, and what lies around them."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NoReturn
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
+from gantrytau.modelica.optimizations import HORIZON
 from gantrytau.modelica.source import SourceText
 
 ELEMENT_SECTIONS = ("", "public", "protected")
@@ -25,6 +26,7 @@ class Element:
     declaration: tree.ComponentDeclaration
     scope: "ClassScope"
     modifier: Modifier
+    protected: bool = False
 
     def under(self, over: Modifier) -> Modifier:
         """What stays said of it under a modification; what redeclares it keeps its constraint alone, if it has one."""
@@ -84,11 +86,15 @@ class ClassScope:
     @cached_property
     def items(self) -> tuple[tree.Element, ...]:
         """What the class itself declares."""
+        return tuple(item for item, _ in self._items)
+
+    @cached_property
+    def _items(self) -> tuple[tuple[tree.Element, bool], ...]:
+        """The same, each with whether it is protected."""
         body = self.definition.body
-        if not isinstance(body, tree.Composition):
-            return ()
-        own = (item for s in body.sections if s.kind in ELEMENT_SECTIONS for item in s.items)
-        return tuple(i for i in own if isinstance(i, tree.Element))
+        sections = body.sections if isinstance(body, tree.Composition) else ()
+        own = ((i, s.kind == "protected") for s in sections if s.kind in ELEMENT_SECTIONS for i in s.items)
+        return tuple((i, protected) for i, protected in own if isinstance(i, tree.Element))
 
     @cached_property
     def classes(self) -> dict[str, "ClassScope"]:
@@ -104,17 +110,17 @@ class ClassScope:
     def declared(self) -> dict[str, Element]:
         """The components that the class itself declares."""
         found: dict[str, Element] = {}
-        for clause in (one for one in self.items if isinstance(one, tree.ComponentClause)):
+        clauses = ((i, hidden) for i, hidden in self._items if isinstance(i, tree.ComponentClause))
+        for clause, protected in clauses:
             for one in clause.components:
                 if one.name in found:
-                    self.refuse(
-                        one.at, f"found a second component '{one.name}' of {self.name}, expected another name"
-                    )
+                    self.refuse(one.at, f"found a second component '{one.name}' of {self.name}, expected one")
                 found[one.name] = Element(
                     clause,
                     one,
                     self,
                     read_modification(one.modification, self, final="final" in clause.prefixes),
+                    protected,
                 )
         return found
 
@@ -122,9 +128,7 @@ class ClassScope:
     def bases(self) -> tuple[tuple["ClassScope", Modifier], ...]:
         """The classes that it extends, with the modifications of each."""
         if self.busy:
-            self.refuse(
-                self.definition.at, f"found {self.name} among the classes that it extends, expected no circle"
-            )
+            self.refuse(self.definition.at, f"found {self.name} among its own bases, expected no circle")
         self.busy = True
         try:
             found = tuple(self._inherited())
@@ -180,27 +184,66 @@ class ClassScope:
                 f"found '{name}' redeclared, expected a class of {self.name}{did_you_mean(name, self.names())}",
             )
         if not {"replaceable", "redeclare"} & set(old.definition.prefixes):
-            scope.refuse(
-                one.at, f"found {old.name} redeclared, expected a class that is declared 'replaceable'"
+            scope.refuse(one.at, f"found {old.name} redeclared, expected a class declared 'replaceable'")
+
+    def refuse_beyond(self, limit: "ClassScope", place: "ClassScope", at: int) -> None:
+        """TextError where this class lacks a public component of the class that constrains what may replace it."""
+        public = (name for name, one in limit.elements.items() if not one.protected)
+        missing = next((name for name in public if name not in self.elements), None)
+        if missing is not None:
+            place.refuse(
+                at,
+                f"found {self.name} for what {limit.name} constrains, but it has no '{missing}', expected a class with all "
+                f"components of {limit.name}",
             )
+
+    def check_replaced(self) -> None:
+        """TextError for a redeclared class, here or in what it extends, that its constraint does not allow."""
+        plain = ClassScope(self.definition, self.source, self.around, more=self.more)
+        for name, new in self.replaced.items():
+            old = plain.inherited_class(name)
+            if old is not None and old.definition is not new.definition and old.around is not None:
+                constraint = old.definition.constraint
+                limit = old if constraint is None else old.around.find_class(constraint.type, constraint.at)
+                new.refuse_beyond(limit, new, new.definition.at)
+        for base, _ in self.bases:
+            base.check_replaced()
 
     @cached_property
     def elements(self) -> dict[str, Element]:
         """All components in the order of their declarations, inherited ones with their modifications."""
         found: dict[str, Element] = {}
-        for base, modifier in self.bases:
+        hidden = [isinstance(item, tree.Extends) and protected for item, protected in self._items]
+        hidden = [
+            h for h, (item, _) in zip(hidden, self._items, strict=True) if isinstance(item, tree.Extends)
+        ]
+        for k, (base, modifier) in enumerate(self.bases):
             for name, element in base.elements.items():
                 over = modifier.inner.get(name)
-                found[name] = element if over is None else _modified(element, over)
+                element = element if over is None else _modified(element, over)
+                if name in found and found[name].scope.definition.name != HORIZON:
+                    self._check_same(found[name], element)
+                found[name] = replace(element, protected=True) if any(hidden[k : k + 1]) else element
             self._check_names(base, modifier)
         for name, element in self.declared.items():
             old = found.get(name)
             if old is not None and "redeclare" in element.clause.prefixes:
-                element = Element(
-                    element.clause, element.declaration, self, merged(element.modifier, old.modifier)
-                )
+                element = replace(element, modifier=merged(element.modifier, old.modifier))
+            elif old is not None:
+                self._check_same(old, element)
             found[name] = element
         return found
+
+    def _check_same(self, one: Element, other: Element) -> None:
+        """TextError for two declarations of one name that say different things."""
+        about = [(x.clause.prefixes, x.clause.type, x.clause.subscripts, x.declaration) for x in (one, other)]
+        if about[0] != about[1] or not one.modifier.says_the_same(other.modifier):
+            places = " and in ".join(x.scope.name for x in (one, other))
+            self.refuse(
+                other.declaration.at if other.scope is self else self.definition.at,
+                f"found '{one.declaration.name}' declared differently in {places}, expected one declaration; rename one, or "
+                "modify it where it is inherited",
+            )
 
     def _check_names(self, base: "ClassScope", modifier: Modifier) -> None:
         for name, one in modifier.inner.items():
@@ -216,6 +259,10 @@ class ClassScope:
         if self.predefined or isinstance(self.definition.body, tree.Enumeration):
             return True
         return len(self.bases) == 1 and self.bases[0][0].is_primitive and not self.declared
+
+    @cached_property
+    def is_external_object(self) -> bool:
+        return any(base.definition.name == "ExternalObject" for base, _ in self.bases)
 
     @cached_property
     def sections(self) -> tuple[StatementSection, ...]:
@@ -247,10 +294,14 @@ class ClassScope:
         found = self.own_class(name)
         return found or next((x for base, _ in self.bases if (x := base.inherited_class(name))), None)
 
+    @cached_property
+    def _imports(self) -> list[tree.Import]:
+        found = [one for one in self.items if isinstance(one, tree.Import)]
+        return sorted(found, key=lambda one: one.names == ("*",))
+
     def imports(self, name: str) -> Iterator[tuple["ClassScope", str, tree.Import]]:
         """What imports may make of a name: a class, the name in it, and the import; those of single names first."""
-        found = [one for one in self.items if isinstance(one, tree.Import)]
-        for item in sorted(found, key=lambda one: one.names == ("*",)):
+        for item in self._imports:
             package, _, last = item.name.rpartition(".")
             if item.names is not None and (name in item.names or item.names == ("*",)):
                 yield self.root.find_class(item.name, item.at), name, item
@@ -259,6 +310,7 @@ class ClassScope:
 
     def imported(self, name: str) -> "ClassScope | None":
         """The class that an import makes of a name."""
+        self._check_imports(name)
         for owner, inner, item in self.imports(name):
             found = owner.inherited_class(inner)
             if found is not None:
@@ -269,6 +321,21 @@ class ClassScope:
                     f"found '{inner}', which {owner.name} does not have{did_you_mean(inner, owner.names())}",
                 )
         return None
+
+    def _check_imports(self, name: str) -> None:
+        """TextError where two imports of one kind, of single names or of all names, make different things of a name."""
+        found: dict[bool, tuple[ClassScope, str]] = {}
+        for owner, inner, item in self.imports(name) if len(self._imports) > 1 else ():
+            general = item.names == ("*",)
+            if general and owner.inherited_class(inner) is None and inner not in owner.elements:
+                continue
+            other, called = found.setdefault(general, (owner, inner))
+            if (other, called) != (owner, inner):
+                self.refuse(
+                    item.at,
+                    f"found '{name}' imported as {other.name}.{called} and as {owner.name}.{inner}, expected one; "
+                    f"write the whole name, or import one under another name, as 'import {name}2 = {owner.name}.{inner}'",
+                )
 
     def first(self, name: str, inherited: bool = True) -> "ClassScope | None":
         """The class that a simple name means here or further out."""
@@ -286,6 +353,7 @@ class ClassScope:
         """The component that a simple name means in a class around this one, and that class."""
         here: ClassScope | None = self
         while here is not None:
+            here._check_imports(name)
             for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
                 if inner in owner.elements:
                     return owner, owner.elements[inner]
@@ -327,4 +395,4 @@ class ClassScope:
 
 
 def _modified(element: Element, over: Modifier) -> Element:
-    return Element(element.clause, element.declaration, element.scope, merged(over, element.under(over)))
+    return replace(element, modifier=merged(over, element.under(over)))

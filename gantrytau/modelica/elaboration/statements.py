@@ -1,23 +1,27 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, TypeGuard, cast
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.events import Happening, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_not
+from gantrytau.language.declarations import Discrete
+from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
+from gantrytau.language.functions import floor, if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
+from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
-from gantrytau.modelica.elaboration.structure import nodes_of
+from gantrytau.modelica.references import nodes_of
 
 ROUNDING = 1e-6  # of a period, by which an instant may be located early
+BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
 
 
@@ -37,11 +41,12 @@ def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
 
 
 def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
-    if remembers(item):
+    if remembers(item, reader.members) or _is_discrete(item, reader):
         for left, right in sides(item, reader):
-            off = Happening(logic_not(right), (left == 0,), initially=True)
-            yield WhenChain((Happening(right, (left == 1,), initially=True), off))
+            yield WhenChain(tuple(_followed(left, right, reader.members.limits(cast(Any, item.left)))))
     elif isinstance(item, tree.SimpleEquation):
+        _check_types(item, reader)
+        reader = replace(reader, settled=True) if _asks_before(item) else reader
         for left, right in sides(item, reader):
             yield left == right
     elif isinstance(item, tree.ConnectEquation):
@@ -55,13 +60,39 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
             instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
             passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
             action = instant == pre(instant) + passed * period
-            yield WhenChain((Happening(time >= instant, (action,), "sample", True),))
+            advance = Happening(time >= instant, (action,), "sample", True)
+            first = at_start((instant == reader.value(call.arguments[0]),))
+            known = reader.members.is_fixed(call.arguments[0])
+            yield WhenChain((advance,) if known else (first, advance))
     elif isinstance(item, tree.Branching):
         yield from _branches(item, reader)
     elif isinstance(item, tree.ProcedureCall):
         yield from _call(item, reader)
     else:
         raise ModelError("found a statement among equations, expected an equation")
+
+
+def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool = False) -> None:
+    """TextError for sides of types that do not go together; assigned: whether the left one takes the other's value."""
+    if isinstance(item.left, tree.OutputList):
+        return
+    left = type_of(item.left, reader)
+    plain = isinstance(item.left, tree.ComponentReference) and not isinstance(
+        item.right, tree.ComponentReference
+    )
+    if assigned or plain or not fits(type_of(item.right, reader), left):
+        check_type(left, item.right, reader, f"the right side of an equation of {left}", item.right.at)
+
+
+def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iterator[Happening]:
+    """What makes a Boolean, or an Integer between limits, follow an expression that asks for values before."""
+    if limits is None:
+        right = values.condition(right)
+        yield Happening(right, (left == 1,), initially=True)
+        yield Happening(logic_not(right), (left == 0,), initially=True)
+        return
+    for value in range(limits[0], limits[1] + 1):
+        yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
 
 
 def first_valued(item: tree.EquationOrStatement) -> str:
@@ -72,12 +103,30 @@ def first_valued(item: tree.EquationOrStatement) -> str:
     return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
 
 
-def remembers(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
-    """Whether it is an equation outside of `when` that asks for values before, as a switch with hysteresis does."""
-    if not isinstance(item, tree.SimpleEquation) or not isinstance(item.left, tree.ComponentReference):
+def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation of a Boolean or Integer outside of `when` that compares values beside instants."""
+    if not _asks_before(item) or not isinstance(item.left, tree.ComponentReference):
         return False
-    names = (call.function.parts[0][0] for call in nodes_of(item.right) if isinstance(call, tree.Call))
-    return any(name in ("pre", "edge", "change") for name in names)
+    calls = [one for one in nodes_of(item.right) if isinstance(one, tree.Call) and one.arguments]
+    asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
+    inside = {id(one) for one in asked}
+    others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
+    jumps = any(one.function.parts[0][0] in ("edge", "change") for one in calls)
+    return members.type_of(item.left) in ("Boolean", "Integer") and bool(
+        jumps or others or item.left in asked
+    )
+
+
+def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
+    names = (call.function.parts[0][0] for call in nodes_of(item) if isinstance(call, tree.Call))
+    return isinstance(item, tree.SimpleEquation) and any(name in BEFORE for name in names)
+
+
+def _is_discrete(item: Any, reader: Interpreter) -> TypeGuard[tree.SimpleEquation]:
+    """Whether it is an equation of what is held between instants, as a Boolean whose `pre` is asked for."""
+    left = item.left if isinstance(item, tree.SimpleEquation) else None
+    members = type(cast(Any, reader.members).instance).members()
+    return isinstance(left, tree.ComponentReference) and isinstance(members.get(left.parts[0][0]), Discrete)
 
 
 def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
@@ -94,7 +143,7 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
     if isinstance(item.left, tree.OutputList):
         if not isinstance(right, tuple):
             raise ModelError(
-                "found one value right of a list of outputs, expected a function with several results"
+                "found one value beside a list of outputs, expected a function of several results"
             )
         if len(item.left.items) > len(right):
             raise ModelError(f"found {len(item.left.items)} outputs, expected at most {len(right)}")
@@ -117,16 +166,14 @@ def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         return
     if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
         raise ModelError(
-            f"found the sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
+            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
         )
     if isinstance(a, np.ndarray) and not a.size:
         return
     left, right = values.to_casadi(a), values.to_casadi(b)
     if not isinstance(left, ca.SX) and not isinstance(right, ca.SX):
         if not np.allclose(np.array(left, float), np.array(right, float), rtol=0, atol=0):
-            raise ModelError(
-                f"found {left} = {right}, which never holds, expected an equation with a variable"
-            )
+            raise ModelError(f"found {left} = {right}, which never holds, expected an equation of a variable")
         return
     left, right = ca.SX(left), ca.SX(right)
     if any(one.numel() > 1 and len(set(map(hash, one.elements()))) == 1 for one in (left, right)):
@@ -146,6 +193,10 @@ def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[An
         a, b = reader.value(item.a), reader.value(item.b)
     except AbsentComponent:
         return
+    kinds = [type_of(one, reader) for one in (item.a, item.b)]
+    if kinds[0] != kinds[1]:
+        words = " and ".join(kind or "members" for kind in kinds)
+        raise ModelError(f"found connectors of {words}, expected connectors of one type")
     for one, other in _ends(a, b):
         yield connect(one, other)
 
@@ -190,7 +241,7 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     for one in stated(items, reader):
         if not isinstance(one, ca.SX):
             raise ModelError(
-                "found connect, when or assert where the condition of 'if' varies, expected equations only"
+                "found connect, when or assert under a condition that varies, expected equations"
             )
         found += [e.dep(0) - e.dep(1) for e in one.elements()]
     return found
@@ -219,18 +270,55 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
 def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
     for test, items in item.branches:
         conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-        if any(_is_call(one, "initial") for one in conditions):
-            raise ModelError(
-                "found initial() in 'when', which is not supported, expected an initial equation beside it"
-            )
         actions = tuple(_actions(items, reader))
+        if len(item.branches) == 1:
+            test, rest = _instant_and_rest(test)
+            conditions = (test,) if rest is not None else conditions
+            if rest is not None:
+                actions = tuple(_guarded(actions, reader.value(rest)))
         for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
+            if _is_call(one, "initial"):
+                yield at_start(actions)
+                continue
             edge = cast(tree.Call, one).arguments[0] if _is_call(one, "edge") else one
             found = values.condition(reader.value(edge))
             if isinstance(found, ca.SX):
                 refuse_change(found)
             sampled = any(sample_calls(one))
             yield Happening(found, actions, "sample" if sampled else "", sampled)
+
+
+def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
+    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
+    conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
+    return tuple(_instant_and_rest(one)[0] for one in conditions)
+
+
+def _instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
+    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
+    if isinstance(test, tree.Binary) and test.operator == "and":
+        for one, other in ((test.left, test.right), (test.right, test.left)):
+            if _is_call(one, "sample") or _is_call(one, "edge"):
+                return one, other
+    return test, None
+
+
+def _guarded(actions: Sequence[Any], test: Any) -> Iterator[Any]:
+    """Actions where a condition holds with the new values of what changes at the instant, else none."""
+    test = values.condition(test)
+    for one in actions:
+        if isinstance(one, Reinit):
+            yield reinit(one.variable, if_else(test, one.value, one.variable))
+        elif isinstance(one, ca.SX):
+            for scalar in one.elements():
+                yield scalar.dep(0) == if_else(test, scalar.dep(1), pre(scalar.dep(0)))
+        else:
+            raise ModelError("found terminate() beside sample() and another condition, expected another when")
+
+
+def at_start(actions: tuple[Any, ...]) -> Happening:
+    """What happens at the start and never again: a condition on the time that always holds."""
+    return Happening(time > -1e30, actions, "at the start", True)
 
 
 def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
@@ -252,6 +340,7 @@ def _is_call(e: tree.Expression, name: str) -> bool:
 def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
     for item in items:
         if isinstance(item, tree.SimpleEquation):
+            _check_types(item, reader, assigned=True)
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):
@@ -264,5 +353,5 @@ def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
             yield terminate(reader.value(item.call.arguments[0]))
         else:
             reader.scope.refuse(
-                item.at, "found what is no equation, reinit or terminate in 'when', expected one of these"
+                item.at, "found another statement in 'when', expected an equation, reinit or terminate"
             )

@@ -3,8 +3,8 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,25 +13,11 @@ import numpy as np
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
+from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue, is_number
-
-
-def picked(value: Any, path: Sequence[int | str]) -> Any:
-    """The part of a value that indices and names of members choose."""
-    for step in path:
-        if isinstance(step, str):
-            value = value[step] if isinstance(value, RecordValue) else value.member(step)
-        elif isinstance(value, (list, np.ndarray)) and step < len(value):
-            value = value[step]
-        else:
-            many = isinstance(value, (list, np.ndarray))
-            raise ModelError(
-                f"found {f'{len(value)} values' if many else 'a scalar'} for an array of components, expected one value for "
-                "each; 'each' before the name takes one value for all"
-            )
-    return value
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
+from gantrytau.modelica.references import references
 
 
 @dataclass(eq=False)
@@ -39,7 +25,7 @@ class Structure:
     """An instance of a class: modifier says what is said of it from outside, whose values know their own instances.
 
     read: names of the parameters that shape it; folding: those whose values are asked for at the moment;
-    started: initial equations that are start values of what a `when` sets.
+    started: initial equations that are start values of what a `when` sets; objects: values of external objects by name.
     """
 
     scope: ClassScope
@@ -51,6 +37,7 @@ class Structure:
     read: set[str] = field(default_factory=set)
     folding: list[str] = field(default_factory=list)
     started: list[Any] = field(default_factory=list)
+    objects: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
     def members(self) -> dict[str, "ClassMember"]:
@@ -59,8 +46,13 @@ class Structure:
             redeclares_class = one.redeclared is not None and one.member_clause is None
             if name not in self.scope.elements and not redeclares_class and one.scope is not None:
                 hint = did_you_mean(name, self.scope.elements)
+                one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
+            element = self.scope.elements.get(name)
+            if element is not None and element.protected and one.scope is not None:
                 one.scope.refuse(
-                    one.at, f"found '{name}' modified, which {self.scope.name} does not have{hint}"
+                    one.at,
+                    f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component; extend "
+                    f"{self.scope.name} to modify it",
                 )
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
@@ -74,7 +66,7 @@ class Structure:
         return self.members[name].shape
 
     def next_sample(self, call: tree.Call) -> Any:
-        raise ModelError("found sample() outside of a condition of 'when', expected it there")
+        raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
@@ -85,17 +77,23 @@ class Structure:
         found = modifier.value
         if isinstance(found, tree.TreeNode):
             found = self.interpreter(modifier.scope, modifier.node).value(found)
-        return picked(found, modifier.path)
+        return modifier.picked(found)
+
+    def _refused(self, said: Modifier, words: str) -> ModelError:
+        """The error of a modification, with its line where it stands in a text."""
+        return (
+            TextError(said.scope.source.told(said.at, words)) if said.scope is not None else ModelError(words)
+        )
 
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
         one = self.members[name]
+        if one.is_object and name not in self.objects:
+            self.objects[name] = self.folded(one.full)
         if one.primitive is None:
-            return one.children if one.shape else one.children[0]
+            return self.objects[name] if one.is_object else one.children if one.shape else one.children[0]
         if not one.is_parameter:
-            raise ModelError(
-                f"found '{name}', a variable, expected what is known when the model is translated"
-            )
+            raise ModelError(f"found the variable '{name}', expected what is known at translation")
         if one.full.value is None:
             raise ModelError(
                 f"found '{name}', which has no value, expected one, as it shapes {self.scope.name}; give {name} = ..."
@@ -113,23 +111,22 @@ class Structure:
             if literal not in one.literals:
                 raise ModelError(f"found {found!r} for '{name}'{did_you_mean(literal, one.literals)}")
             return EnumerationValue(one.literals.index(literal) + 1, literal, one.primitive.name)
+        if not fits(one.type_name, type_of_value(found)):
+            raise self._refused(one.full, f"found {found!r} for '{name}', expected {one.type_name}")
         if not is_number(found):
-            raise ModelError(
-                f"found the value of '{name}' to vary, expected what is known when the model is translated"
-            )
-        if one.kind == "Real" and isinstance(found, int) and not isinstance(found, bool):
-            return float(found)
-        return (
-            int(found)
-            if one.kind == "Integer" and isinstance(found, float) and found == int(found)
-            else found
-        )
+            raise ModelError(f"found the value of '{name}' to vary, expected one known at translation")
+        if isinstance(found, (int, float)) and one.kind in ("Real", "Integer"):
+            return float(found) if one.kind == "Real" else int(found)
+        return found
 
     def prepare(self) -> None:
         """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""
+        self.scope.check_replaced()
         for one in self.members.values():
             one.full  # noqa: B018  (what is final is told here)
-            if one.present and one.shape is not None:
+            if one.present and one.is_object:
+                self.member(one.name)
+            elif one.present and one.shape is not None:
                 for child in one.children if "outer" not in one.prefixes else ():
                     child.prepare()
         for section in self.scope.sections:
@@ -160,41 +157,39 @@ class Structure:
                 whole = tuple((name, ()) for name, _ in one.parts)
                 self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        one = self._leaf(reference)
+        return "" if one is None else one.type_name
+
+    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+        one = self._leaf(reference)
+        if one is None or one.kind == "Boolean":
+            return None
+        said = [one.full.inner.get(name) for name in ("min", "max")]
+        if None in said:
+            raise ModelError(f"found '{one.name}' by its value before, expected its min and max")
+        low, high = (int(self.folded(limit)) for limit in said if limit is not None)
+        return low, high
+
     def is_fixed(self, expression: Any) -> bool:
         return all(map(self._is_known, references(expression)))
 
     def _is_known(self, reference: tree.ComponentReference) -> bool:
         """Whether a reference leads to a parameter or constant."""
-        here: Structure = self
+        if not self.has(reference.parts[0][0]):
+            return reference.parts[0][0] != "time"
+        one = self._leaf(reference)
+        return one is None or one.is_parameter
+
+    def _leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
+        """The number, Boolean, text or choice to which a reference leads; None for all else."""
+        here: Structure | None = self
         for name, _ in reference.parts:
-            if not here.has(name):
-                return here is self and name != "time"
-            one = here.members[name]
-            if one.primitive is not None:
-                return one.is_parameter
-            if not one.children:
-                break
-            here = one.children[0]
-        return True
-
-
-def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
-    """An expression and all that is in it; not the names of functions."""
-    if isinstance(expression, tree.Call):
-        yield expression
-        yield from nodes_of((expression.arguments, expression.named))
-    elif isinstance(expression, (tuple, list)):
-        for one in expression:
-            yield from nodes_of(one)
-    elif isinstance(expression, tree.TreeNode):
-        yield expression
-        for name in type(expression).__slots__:
-            yield from nodes_of(getattr(expression, name))
-
-
-def references(expression: Any) -> list[tree.ComponentReference]:
-    """The references in an expression, but for names of functions."""
-    return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
+            one = here.members.get(name) if here is not None else None
+            if one is None or one.primitive is not None:
+                return one
+            here = one.children[0] if one.children else None
+        return None
 
 
 @dataclass(eq=False)
@@ -227,7 +222,11 @@ class ClassMember:
     def plain_type(self) -> ClassScope:
         """Its class, without what is redeclared in it."""
         clause, scope = self.clause
-        return scope.find_class(clause.type, clause.at)
+        found, old = scope.find_class(clause.type, clause.at), self.element
+        if clause is not old.clause:
+            limit = old.clause.constraint or old.clause
+            found.refuse_beyond(old.scope.find_class(limit.type, limit.at), scope, clause.at)
+        return found
 
     @cached_property
     def own(self) -> Modifier:
@@ -237,8 +236,9 @@ class ClassMember:
         if constraint is not None:
             said = merged(said, read_arguments(constraint.arguments, self.element.scope))
         for one in self.chain:
-            for _, modifier in one.bases:
-                said = merged(said, modifier)
+            for _, modifier in one.bases:  # attributes of a type are those of each element
+                each = {name: replace(said_of, each=True) for name, said_of in modifier.inner.items()}
+                said = merged(said, replace(modifier, inner=each))
         return said
 
     @cached_property
@@ -263,8 +263,17 @@ class ClassMember:
         return self.chain[-1] if self.chain else None
 
     @property
+    def is_object(self) -> bool:
+        return self.primitive is None and self.plain_type.is_external_object
+
+    @property
     def kind(self) -> str:
         return "" if self.primitive is None else self.primitive.definition.name
+
+    @property
+    def type_name(self) -> str:
+        """Real, Integer, Boolean, String or the full name of an enumeration."""
+        return "" if self.primitive is None else self.primitive.name
 
     @cached_property
     def prefixes(self) -> set[str]:
@@ -280,7 +289,15 @@ class ClassMember:
 
     @property
     def is_parameter(self) -> bool:
-        return bool({"parameter", "constant"} & self.prefixes) or self.kind == "String"
+        stated = bool({"parameter", "constant"} & self.prefixes) and not self.is_solved
+        return stated or self.kind == "String"
+
+    @cached_property
+    def is_solved(self) -> bool:
+        """Whether it is a parameter whose value initial equations determine: `fixed = false`."""
+        fixed = self.full.inner.get("fixed")
+        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
+        return free and "parameter" in self.prefixes and self.full.value is None
 
     @property
     def is_folded(self) -> bool:
@@ -340,9 +357,7 @@ class ClassMember:
             return meant.children
         clause, scope = self.clause
         if len(self.shape) > 1:
-            scope.refuse(
-                clause.at, f"found an array of components of {len(self.shape)} dimensions, expected one"
-            )
+            scope.refuse(clause.at, f"found components of {len(self.shape)} dimensions, expected one")
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
             scope.refuse(
@@ -350,14 +365,16 @@ class ClassMember:
                 f"found a component of {kind.name}, which is partial, expected a class that extends it",
             )
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        said = [self.full.of_element(k) for k in range(self.shape[0])] if self.shape else [self.full]
+        said = (
+            [self.full.of_element(k, self.shape[0]) for k in range(self.shape[0])]
+            if self.shape
+            else [self.full]
+        )
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
         around = self.owner
         while around is not None:
             if around.scope.definition is kind.definition:
-                scope.refuse(
-                    clause.at, f"found a component of {kind.name} within itself, expected another class"
-                )
+                scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
             around = around.around
         return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
 
@@ -369,9 +386,3 @@ class ClassMember:
                 return around.members[self.name]
             around = around.around
         return None
-
-
-def plain(values: Mapping[str, Any]) -> Modifier:
-    """Modifications by plain values, nested as mappings."""
-    inner = {n: plain(v) if isinstance(v, Mapping) else Modifier(value=v) for n, v in values.items()}
-    return Modifier(inner=inner)

@@ -44,7 +44,7 @@ def array(items: Sequence[Any]) -> Any:
     shapes = {np.shape(one) if isinstance(one, np.ndarray) else () for one in items}
     if len(shapes) > 1:
         raise ModelError(
-            f"found elements of the shapes {', '.join(map(str, sorted(shapes)))} in an array, expected one shape"
+            f"found the shapes {', '.join(map(str, sorted(shapes)))} in an array, expected one shape"
         )
     inner = shapes.pop() if shapes else ()
     found = np.empty((len(items), *inner), dtype=object)
@@ -68,9 +68,7 @@ def to_casadi(value: Any) -> Any:
     if not isinstance(value, np.ndarray):
         return value
     if value.ndim > 2:
-        raise ModelError(
-            f"found an array of {value.ndim} dimensions, expected at most two; use an array of components"
-        )
+        raise ModelError(f"found {value.ndim} dimensions, expected at most two; use an array of components")
     if value.size == 0:
         raise ModelError("found an array without elements, expected at least one")
     rows = [ca.horzcat(*row) for row in (value if value.ndim == 2 else value[:, None])]
@@ -106,7 +104,7 @@ def _kind(value: Any) -> str:
 def _same_shape(sign: str, a: Any, b: Any) -> None:
     if np.shape(_shaped(a)) != np.shape(_shaped(b)):
         raise ModelError(
-            f"found the sizes {size_words(a)} and {size_words(b)} beside '{sign}', expected one size; '.{sign}' takes "
+            f"found sizes {size_words(a)} and {size_words(b)} beside '{sign}', expected one size; '.{sign}' takes "
             "a scalar for every element"
         )
 
@@ -119,6 +117,11 @@ def size_words(value: Any) -> str:
     """The size of a value as Modelica writes it."""
     shape = np.shape(_shaped(value))
     return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
+
+
+def sized(value: Any) -> str:
+    """The same, as a noun."""
+    return size_words(value).removeprefix("of ")
 
 
 def boxed(value: Any) -> Any:
@@ -146,7 +149,7 @@ def _product(a: Any, b: Any) -> Any:
         return _spread(operator.mul)(a, b)
     if a.shape[-1] != b.shape[0]:
         raise ModelError(
-            f"found the sizes {size_words(a)} and {size_words(b)} beside '*', expected inner sizes that agree"
+            f"found sizes {size_words(a)} and {size_words(b)} beside '*', expected equal inner sizes"
         )
     return a.dot(b)
 
@@ -249,9 +252,7 @@ def _size(value: Any, dimension: int | None = None) -> Any:
     if dimension is None:
         return array(list(shape))
     if not 1 <= dimension <= len(shape):
-        raise ModelError(
-            f"found size(..., {dimension}) of {len(shape)} dimensions, expected 1 to {len(shape)}"
-        )
+        raise ModelError(f"found size(..., {dimension}), expected 1 to {len(shape)}")
     return shape[dimension - 1]
 
 
@@ -344,7 +345,6 @@ REFUSED: Mapping[str, str] = {
     "cardinality": "give a Boolean parameter that says whether something is connected",
     "terminal": "leave out what is done at the end",
     "getInstanceName": "write the text itself",
-    "initial": "write an initial equation, or a start value",
 }
 
 

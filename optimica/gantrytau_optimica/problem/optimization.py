@@ -62,12 +62,14 @@ class Optimization(Model):
     as `prbs`.
     A component that is an Optimization itself is a phase: it has a clock, objective and limits of its own, and this
     problem may add an objective and conditions on values at times, `yield link(self.first, self.second)` among them.
-    A problem without derivatives and time is a static one: its signals have one value.
+    A problem without derivatives and time is a static one: its signals have one value. With static=True it is one at rest:
+    all derivatives of its models are zero.
     Where it mentions the rate of an input, `between(-800, der(self.crane.f), 800)`, that input is continuous.
     """
 
     start_time: Any = 0.0
     final_time: Any = 1.0
+    static: Any = False
     given: tuple[str, ...] = ()
     inputs: Mapping[str, Any] = MappingProxyType({})
 

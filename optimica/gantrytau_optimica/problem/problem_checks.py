@@ -10,7 +10,7 @@ import casadi as ca
 from gantrytau import Dae, ModelError
 from gantrytau.language.symbols import split_derivative, time
 from gantrytau_optimica.problem.optimization import Optimization, Point, Target
-from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicProblem
+from gantrytau_optimica.problem.symbolic_problem import ConstraintRow, SymbolicPhase, SymbolicProblem
 
 
 def static(dae: Dae) -> bool:
@@ -89,6 +89,16 @@ def check_constraints(constraints: Iterable[ConstraintRow], targets: Iterable[Ta
                 raise ModelError(
                     f"{constraint.place}: {target.symbol} stands in a constraint, expected it in objective() only"
                 )
+
+
+def check_integrands(name: str, phases: Iterable[SymbolicPhase], points: Iterable[Point]) -> None:
+    """ModelError for a value at a time in an integrand, which is of signals."""
+    symbols = {e.element_hash() for p in points for e in p.symbol.elements()}
+    for phase in phases:
+        found = next((leaf for leaf in ca.symvar(phase.integrand) if leaf.element_hash() in symbols), None)
+        if found is not None:
+            place = ".".join(part for part in (name, phase.name, "integrand") if part)
+            raise ModelError(f"{place}: found {found}, expected signals over time; name the variable itself")
 
 
 def check_spelling(problem: type[Optimization]) -> None:

@@ -33,12 +33,14 @@ from gantrytau_optimica.problem.optimization import (
 )
 from gantrytau_optimica.problem.problem_checks import (
     check_constraints,
+    check_integrands,
     check_objective,
     check_spelling,
     check_times,
 )
 from gantrytau_optimica.problem.problem_units import check_problem_units
 from gantrytau_optimica.problem.start_targets import with_told_starts
+from gantrytau_optimica.problem.steady_state import at_rest
 from gantrytau_optimica.problem.symbolic_problem import (
     ConstraintRow,
     LinkedPaths,
@@ -68,6 +70,9 @@ def read_problem(
     name = type(root).__name__
     flat = write_out(instance) if change is None else change(write_out(instance))
     known = set(flat.derivatives)
+    flat = at_rest(flat) if root.static else flat
+    if all(one.failure for one in flat.whens):  # assertions, which a simulation of the answer tells
+        flat = replace(flat, whens=())
     stages = _stages(name, instance)
     for _, one in stages:
         check_spelling(type(one))
@@ -123,6 +128,7 @@ def _checked(said: _Said, instance: Instance, guess: Any) -> SymbolicProblem:
     for one in (*points, *targets):
         refuse_calls(str(one.symbol), one.expression)
     check_constraints(said.constraints, targets)
+    check_integrands(name, phases, points)
     check_problem_units(replace(flat, derivatives=derivatives), said.constraints, points, times)
     told = partial(with_told_starts, flat, said.constraints, points, guess)
     dae = _translated(flat, said.given, said.mentioned, told)

@@ -5,6 +5,7 @@ import inspect
 import json
 import signal
 import sys
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -267,3 +268,15 @@ def test_nothing_but_the_user_speaks_on_stderr_without_a_terminal(run, move):
     found = run("optimize", move, "--json")
     assert found.stderr == "loading\n"
     assert json.loads(found.stdout)["success"] is True
+
+
+def test_a_problem_of_optimica_text_is_named_by_its_file(run, answer):
+    file = Path(__file__).parents[2] / "optimica" / "text" / "problems.mop"
+    found = answer("optimize", f"{file}:Problems.Fastest", "--refine", "1e-6", "--set", "finalTime=3")
+    assert found["problem"] == "Fastest"
+    assert found["free"]["finalTime"] == pytest.approx(
+        2.2811848, rel=1e-6
+    )  # of van der Pol's equation, converged
+    several = run("optimize", file)
+    assert several.exit_code == MISUSE
+    assert "several problems (Problems.Box, " in " ".join(several.stderr.split())

@@ -1,0 +1,126 @@
+"""Types of values and of expressions (Modelica 3.6, chapters 3.6 and 6.7), as far as the text tells them."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration.interpreter import Interpreter
+from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
+
+BOOLEANS = frozenset({"edge", "change", "initial", "terminal", "sample"})
+INTEGERS = frozenset({"size", "ndims", "integer", "Integer"})
+OF_ARGUMENT = {"pre": 0, "noEvent": 0, "smooth": 1, "homotopy": 0, "delay": 0, "abs": 0, "sum": 0, "fill": 0}
+
+
+def fits(wanted: str, found: str) -> bool:
+    """Whether a value of a type may stand where another is wanted; "" is a type that is not known."""
+    return not wanted or not found or wanted == found or (wanted, found) == ("Real", "Integer")
+
+
+def type_of_value(value: Any) -> str:
+    """The type of a plain value or of the first element of an array; "" for expressions and records."""
+    if isinstance(value, np.ndarray):
+        value = value.flat[0] if value.size else None
+    if isinstance(value, EnumerationValue):
+        return value.type
+    if isinstance(value, float) and value.is_integer():
+        return "Integer"
+    return {bool: "Boolean", int: "Integer", float: "Real", str: "String"}.get(type(value), "")
+
+
+def type_of(e: Any, reader: Interpreter) -> str:
+    """Real, Integer, Boolean, String or the name of an enumeration; "" where it is not known.
+
+    Raises ModelError with the line where an operator has operands that it does not take.
+    """
+    if isinstance(e, tree.ComponentReference):
+        return _type_of_reference(e, reader)
+    if isinstance(e, tree.Call):
+        return "" if e.iterators else _type_of_call(e, reader)
+    if isinstance(e, tree.Unary):
+        (found,) = _operands(
+            (e.operand,), ("Boolean",) if e.operator == "not" else NUMBERS, e.operator, reader
+        )
+        return "Boolean" if e.operator == "not" else found
+    if isinstance(e, tree.Binary):
+        return _type_of_binary(e, reader)
+    if isinstance(e, tree.Conditional):
+        tests, branches = zip(*e.branches, strict=True)
+        _operands(tests, ("Boolean",), "if", reader)
+        return _joined((*branches, e.otherwise), reader)
+    if isinstance(e, tree.ArrayConstructor):
+        return "" if e.iterators else _joined(e.items, reader)
+    if isinstance(e, (tree.Number, tree.StringLiteral, tree.BooleanLiteral)):
+        found = reader.value(e)
+        return "Real" if isinstance(found, float) else type_of_value(found)
+    return type_of(e.array, reader) if isinstance(e, tree.Subscripted) else ""
+
+
+NUMBERS = ("Real", "Integer")
+
+
+def _type_of_binary(e: tree.Binary, reader: Interpreter) -> str:
+    sign, sides = e.operator, (e.left, e.right)
+    if sign in ("and", "or"):
+        _operands(sides, ("Boolean",), sign, reader)
+        return "Boolean"
+    if sign in RELATIONS:
+        _joined(sides, reader)
+        return "Boolean"
+    found = _operands(sides, (*NUMBERS, "String") if sign == "+" else NUMBERS, sign, reader)
+    if "" in found:
+        return ""
+    return "Real" if sign in ("/", "./", "^", ".^") or "Real" in found else found[0]
+
+
+def _operands(items: Iterable[Any], taken: tuple[str, ...], sign: str, reader: Interpreter) -> list[str]:
+    """The types of operands; TextError for one that the operator does not take."""
+    found = [(one, type_of(one, reader)) for one in items]
+    for one, kind in found:
+        if kind and kind not in taken:
+            reader.scope.refuse(one.at, f"found {kind} beside '{sign}', expected {' or '.join(taken)}")
+    return [kind for _, kind in found]
+
+
+def _joined(items: Iterable[Any], reader: Interpreter) -> str:
+    """The one type of several expressions; TextError for two that do not go together."""
+    found = ""
+    for one in items:
+        kind = type_of(one, reader)
+        if not (fits(found, kind) or fits(kind, found)):
+            reader.scope.refuse(one.at, f"found {kind} beside {found}, expected one type")
+        found = "Real" if "Real" in (found, kind) else kind or found
+    return found
+
+
+def _type_of_reference(e: tree.ComponentReference, reader: Interpreter) -> str:
+    name = e.parts[0][0]
+    if reader.members.has(name):
+        return reader.members.type_of(e)
+    if name in reader.local:
+        return type_of_value(reader.local[name])
+    return "Real" if name == "time" else type_of_value(reader.value(e))
+
+
+def _type_of_call(e: tree.Call, reader: Interpreter) -> str:
+    name, function = reader.function(e)
+    if name in BOOLEANS | INTEGERS or name == "String":
+        return "Boolean" if name in BOOLEANS else "String" if name == "String" else "Integer"
+    if name in OF_ARGUMENT and len(e.arguments) > OF_ARGUMENT[name]:
+        return type_of(e.arguments[OF_ARGUMENT[name]], reader)
+    elements = function.elements if function is not None else {}
+    outputs = [n for n, one in elements.items() if "output" in one.clause.prefixes]
+    if function is None or not outputs:
+        return ""
+    first = tree.ComponentReference(e.at, ((outputs[0], ()),))
+    return reader.library.package(function).type_of(first)
+
+
+def check_type(wanted: str, expression: Any, reader: Interpreter, what: str, at: int) -> None:
+    """TextError where an expression is of a type that does not fit."""
+    found = type_of(expression, reader) if isinstance(expression, tree.TreeNode) else ""
+    if not fits(wanted, found):
+        remedy = "; integer() makes it whole" if (wanted, found) == ("Integer", "Real") else ""
+        reader.scope.refuse(at, f"found {found} for {what}, expected {wanted}{remedy}")

@@ -1,0 +1,25 @@
+"""References in expressions."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from gantrytau.modelica import tree
+
+
+def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
+    """An expression and all that is in it; not the names of functions."""
+    if isinstance(expression, tree.Call):
+        yield expression
+        yield from nodes_of((expression.arguments, expression.named))
+    elif isinstance(expression, (tuple, list)):
+        for one in expression:
+            yield from nodes_of(one)
+    elif isinstance(expression, tree.TreeNode):
+        yield expression
+        for name in type(expression).__slots__:
+            yield from nodes_of(getattr(expression, name))
+
+
+def references(expression: Any) -> list[tree.ComponentReference]:
+    """The references in an expression, but for names of functions."""
+    return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]

@@ -1,0 +1,1 @@
+"""Problems that are Optimica text, as classes of the language of optimisation problems."""

@@ -1,0 +1,146 @@
+"""What Modelica text does at instants: starts, samples, values before and behind, friction, and tables that jump."""
+
+import numpy as np
+import pytest
+
+from gantrytau import load_modelica, simulate
+
+STICKING = """model M "unit mass on dry friction of 2 N, pushed by 3 N behind 2 s"
+  Real v(start=1, fixed=true), a, sa, f;
+  Integer mode(min=0, max=1, start=0);
+  Boolean forward, locked;
+equation
+  der(v) = a;
+  a = (if time > 2 then 3 else 0) - f;
+  forward = pre(mode) == 0 and (sa > 2 or pre(forward) and sa > 2) or initial() and v > 0;
+  locked = not (pre(mode) == 1 or forward);
+  a = if locked then 0 else sa - 2;
+  f = if locked then sa else 2;
+  mode = if (pre(mode) == 1 or forward) and v > 0 then 1 else 0;
+end M;
+"""
+
+
+def test_friction_by_a_mode_that_remembers_sticks_and_breaks_away(tmp_path):
+    (tmp_path / "sticking.mo").write_text(STICKING)
+    found = simulate(load_modelica(tmp_path / "sticking.mo")["M"](), stop=3.0)
+    np.testing.assert_allclose(found.at(np.array([0.25, 1.0, 1.9, 3.0]), "v"), [0.5, 0, 0, 1], atol=1e-6)
+
+
+TABLE = """type Smoothness = enumeration(LinearSegments, ConstantSegments);
+type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic);
+class Held
+  extends ExternalObject;
+  function constructor
+    input String tableName;
+    input String fileName;
+    input Real table[:, :];
+    input Integer columns[:];
+    input Smoothness smoothness;
+    input Extrapolation extrapolation;
+    output Held held;
+    external "C" held = ModelicaStandardTables_CombiTable1D_init3(fileName, tableName, table);
+  end constructor;
+end Held;
+function unknown
+  input String text;
+  output Boolean found;
+  external "C" found = unknown_in_c(text);
+end unknown;
+function value
+  input Held held;
+  input Integer column;
+  input Real u;
+  output Real y;
+  external "C" y = ModelicaStandardTables_CombiTable1D_getValue(held, column, u);
+end value;
+model M
+  parameter Real numbers[:, :] = {{0, 0, 5}, {1, 2, 6}, {1, 4, 7}, {2, 4, 8}};
+  parameter Smoothness smoothness = Smoothness.LinearSegments;
+  parameter Extrapolation beyond = Extrapolation.HoldLastPoint;
+  parameter String file = if false and unknown("") then "file" else "NoName";
+  parameter Held held = Held("NoName", file, numbers, {2, 3}, smoothness, beyond);
+  Real y = value(held, 1, time);
+end M;
+"""
+
+
+@pytest.mark.parametrize(
+    ("smoothness", "beyond", "wanted"),
+    [
+        ("LinearSegments", "HoldLastPoint", [1, 4, 4, 4]),
+        ("ConstantSegments", "HoldLastPoint", [0, 4, 4, 4]),
+        ("LinearSegments", "Periodic", [1, 4, 1, 4]),
+    ],
+)
+def test_tables_are_read_by_external_functions(smoothness, beyond, wanted, tmp_path):
+    (tmp_path / "table.mo").write_text(TABLE)
+    model = load_modelica(tmp_path / "table.mo")["M"](smoothness=smoothness, beyond=beyond)
+    found = simulate(model, stop=4.0)
+    np.testing.assert_allclose(found.at(np.array([0.5, 1.5, 2.5, 3.5]), "y"), wanted, atol=1e-9)
+
+
+TOGETHER = """model M
+  Boolean b = time > 0.25;
+  Integer pair[2](each start=0), n(start=0), few(start=0), many(start=0), edges(start=0), before(start=0);
+equation
+  when sample(0.1, 0.1) then
+    n = pre(n) + 1;
+  end when;
+  when sample(0.1, 0.1) and n < 3 then
+    few = pre(few) + 1;
+    pair = {few, n};
+  end when;
+  when n > 2 and sample(0.1, 0.1) then
+    many = pre(many) + 1;
+  end when;
+  when edge(b) and n > 5 then
+    edges = pre(edges) + 1;
+  end when;
+  when time > 0.25 then
+    before = if pre(b) then 1 else 2;
+  end when;
+end M;
+"""
+
+
+def test_what_stands_beside_an_instant_has_the_new_values_and_pre_the_old_ones(tmp_path):
+    (tmp_path / "together.mo").write_text(TOGETHER)
+    found = simulate(load_modelica(tmp_path / "together.mo")["M"](), stop=0.55)
+    assert [found.final(n) for n in ("n", "few", "many", "edges", "before")] == [5, 2, 3, 0, 2]
+    assert found.final("pair").tolist() == [2, 2]
+
+
+PERIODS = """model M
+  Integer count, ticks(start=0);
+  Real begin;
+  parameter Real t0(fixed=false);
+  Integer seen(start=0);
+initial equation
+  t0 = time;
+initial algorithm
+  count := integer(time / 0.25);
+  begin := count * 0.25;
+equation
+  when time >= (pre(count) + 1) * 0.25 then
+    count = pre(count) + 1;
+    begin = time;
+  end when;
+  when sample(t0 + 0.1, 0.5) then
+    ticks = pre(ticks) + 1;
+  end when;
+  when {initial(), time > 0.4} then
+    seen = pre(seen) + 1;
+  end when;
+  annotation(experiment(StartTime=0.3, StopTime=1.1));
+end M;
+"""
+
+
+def test_initial_algorithms_and_whens_with_initial_act_at_the_start(tmp_path):
+    (tmp_path / "periods.mo").write_text(PERIODS)
+    found = simulate(load_modelica(tmp_path / "periods.mo")["M"]())
+    begun = [found.at(t, n) for t in (0.35, 0.6, 1.05) for n in ("count", "begin", "seen")]
+    np.testing.assert_allclose(
+        begun, [1, 0.25, 1, 2, 0.5, 2, 4, 1.0, 2], atol=1e-7
+    )  # of the instants' location
