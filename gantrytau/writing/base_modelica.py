@@ -153,7 +153,9 @@ class _Writer:
     def _asserted(self) -> list[str]:
         """What parameters must satisfy, and the ends of tables that are not defined beyond."""
         found = [(ca.SX(one.condition), one.message) for one in self.flat.requirements]
-        found += [(ca.logic_and(r.low <= r.expression, r.expression <= r.high), r.left) for r in self.flat.ranges]
+        found += [
+            (ca.logic_and(r.low <= r.expression, r.expression <= r.high), r.left) for r in self.flat.ranges
+        ]
         conditions = [self.graph.truth(*self.graph.read([condition])) for condition, _ in found]
         texts = write(conditions, self.syntax, {})
         pairs = zip(conditions, found, strict=True)
@@ -162,7 +164,10 @@ class _Writer:
     def _left_out(self) -> list[str]:
         redundant = (*self.dae.redundant, *self.dae.reduced.redundant)
         left_out = [f"  // left out, it follows from the others: {e.name}" for e in redundant]
-        return [*left_out, *(f"  // an input here, in the model {line}" for line in friction_lines(self.flat))]
+        return [
+            *left_out,
+            *(f"  // an input here, in the model {line}" for line in friction_lines(self.flat)),
+        ]
 
     def _parameter(self, parameter: FlatParameter, k: int) -> str:
         value = self._expression(parameter.elements[k], parameter.value[k])

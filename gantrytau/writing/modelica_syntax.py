@@ -16,6 +16,7 @@ FUNCTIONS = {
     "min": "min", "max": "max", "fmod": "rem",
 }  # fmt: skip
 
+
 def quoted(name: str) -> str:
     """A name as a quoted identifier; letters beyond ASCII, which may not stand there, as their code."""
     escaped = name.replace("\\", "\\\\").replace("'", "\\'")

@@ -81,7 +81,9 @@ def _state(state: tuple[str, str]) -> str:
 
 def friction_lines(flat: FlatModel) -> list[str]:
     """Friction that sticks, line by line."""
-    return [line for one in at_instants(replace(flat, sampled=(), whens=(), delays=())) for line in _instant(one)]
+    return [
+        line for one in at_instants(replace(flat, sampled=(), whens=(), delays=())) for line in _instant(one)
+    ]
 
 
 def _instant(one: AtInstants) -> list[str]:

@@ -5,7 +5,7 @@ one that does has the variable '=begun' in its condition, which becomes 1 right 
 """
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 
 import casadi as ca
 
@@ -110,11 +110,11 @@ class WhenEquations:
         return f"{self.syntax.enclose(found.text) if found.level < AND else found.text} and {BEGUN} > 0.5"
 
     def _actions(self, one: When) -> Iterator[str]:
-        write_in: Callable[[ca.SX], str] = lambda e: self._text(self._before(e, self._moving - self.held))
+        moving = self._moving - self.held
         for name, value in one.reinits:
-            yield f"reinit({quoted(name)}, {write_in(value)})"
+            yield f"reinit({quoted(name)}, {self._text(self._before(value, moving))})"
         for name, value in one.assignments:
-            yield f"{quoted(name)} = {write_in(value)}"
+            yield f"{quoted(name)} = {self._text(self._before(value, moving))}"
         if one.failure:
             yield f"assert(false, {string(one.failure)})"
         if one.message:

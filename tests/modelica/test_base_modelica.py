@@ -1,0 +1,134 @@
+"""Models go out as Base Modelica and come back with the same trajectories, events included."""
+
+import numpy as np
+import pytest
+
+from gantrytau import (
+    Discrete,
+    Mode,
+    Model,
+    Parameter,
+    Real,
+    delay,
+    der,
+    load_modelica,
+    pre,
+    reinit,
+    require,
+    sampled,
+    simulate,
+    terminate,
+    transition,
+    translate,
+    when,
+)
+from gantrytau.modelica import read_tree, written
+from gantrytau_models import (
+    DeltaRobot,
+    F1GantryTau,
+    FiveDofGantryTau,
+    FourBar,
+    GantryTau,
+    Pendulum,
+    SixLinkGantryTau,
+    SixLinkWithWrist,
+    StewartPlatform,
+    prototypes,
+)
+from gantrytau_models.control.tracking import ControlledRobot
+from gantrytau_models.leadthrough.lead_through import LeadThrough
+from gantrytau_models.leadthrough.peg_control import PegControl
+from tests.families import first_of
+from tests.modelica.test_parser import HERE, read
+
+
+class Ball(Model):
+    """A ball with every kind of instant: reinit, a chain, terminate, a sampling, a delay, a mode that turns at the start."""
+
+    e = Parameter(0.7, unit="1")
+    h = Real(unit="m", start=1.0, fixed=True)
+    v = Real(unit="m/s", start=0.0, fixed=True)
+    n = Discrete(0, unit="1")
+    y, before = Real(unit="m"), Real(unit="m")
+    mode = Mode("up", "down")
+
+    def equations(self):
+        yield der(self.h) == self.v
+        yield der(self.v) == -9.81
+        bounce = when(self.h <= 0, reinit(self.v, -self.e * pre(self.v)), self.n == pre(self.n) + 1)
+        yield bounce.elsewhen(self.n > 5, terminate("enough"))
+        yield sampled(self.y, 2 * self.h + self.y, period=0.1)
+        yield self.before == delay(self.h, 0.05)
+        yield transition(self.mode, "up", "down", self.v <= 0)
+        yield transition(self.mode, "down", "up", self.v > 0)
+        yield require(self.e < 1, "expected a loss")
+
+
+def round_trip(model, stop, folder):
+    """Results of a model, and of what is read from its text."""
+    dae = translate(model, units=False, events=True)
+    (folder / "model.mo").write_text(dae.equations("base-modelica"))
+    library = load_modelica(folder / "model.mo")
+    assert library.names == (type(model).__name__,)
+    back = library[library.names[0]]()
+    return [simulate(one, stop=stop, tolerance=1e-10) for one in (dae, back)]
+
+
+def assert_same(results, least):
+    """All variables are the same where both results have one value; least: number of variables."""
+    single = [np.unique(one.time, return_counts=True) for one in results]
+    common = np.intersect1d(*(t[count == 1] for t, count in single))
+    assert common.size > 100
+    names = [n for n in results[0].names if n in results[1].names]
+    assert len(names) >= least
+    for name in names:
+        there, back = (np.array(one[name])[np.searchsorted(one.time, common)] for one in results)
+        # a hundred times the tolerance of the integrator
+        assert np.abs(there - back).max() <= 1e-8 * max(1.0, np.abs(there).max()), name
+
+
+def test_events_come_back(tmp_path):
+    there, back = round_trip(Ball(), 3.0, tmp_path)
+    assert_same((there, back), 6)
+    assert there.ended == back.ended == "enough"
+    assert (back.final("n"), back["mode"][1]) == (6, 1)
+
+
+def test_a_text_that_came_back_goes_out_again(tmp_path):
+    dae = translate(Ball(), units=False, events=True)
+    (tmp_path / "model.mo").write_text(dae.equations("base-modelica"))
+    back = load_modelica(tmp_path / "model.mo")["Ball"]
+    assert_same(round_trip(back(), 1.0, tmp_path), 6)
+
+
+LIBRARY = {
+    "pendulum": (Pendulum, 1.0),
+    "four bars": (FourBar, 0.3),
+    "modes and delays": (LeadThrough, 0.1),
+    "robot": (lambda: GantryTau(prototypes.L1), 0.1),
+    "six links": (lambda: SixLinkGantryTau(prototypes.D1), 0.1),
+    "F1": (lambda: F1GantryTau(prototypes.F1), 0.1),
+    "wrist": (lambda: SixLinkWithWrist(prototypes.L1), 0.1),
+    "five axes": (lambda: FiveDofGantryTau(prototypes.L1), 0.1),
+    "delta": (DeltaRobot, 0.1),
+    "hexapod": (StewartPlatform, 0.1),
+    "controlled": (lambda: ControlledRobot(prototypes.L1), 0.1),
+    "peg": (PegControl, 0.1),
+}
+
+
+@pytest.mark.parametrize("name", first_of(LIBRARY, 3))
+def test_a_model_of_the_library_comes_back(name, tmp_path):
+    build, stop = LIBRARY[name]
+    assert_same(round_trip(build(), stop, tmp_path), 10)
+
+
+def test_what_only_base_modelica_says():
+    library = load_modelica(HERE / "base.mo")
+    assert library.names == ("A.B",)  # the package and the model are one
+    found = simulate(library["A.B"](), stop=2.0, tolerance=1e-10)
+    assert found.final("x[1]") == pytest.approx(2 * np.exp(-2.0), abs=1e-8)
+    assert found.final("z[3]") == pytest.approx(3 + 2 * (1 - np.exp(-2.0)), abs=1e-8)
+    assert found.final("n") == 5
+    tree = read_tree(HERE / "base.mo")
+    assert read(written(tree)) == tree
