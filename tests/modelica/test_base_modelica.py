@@ -76,8 +76,8 @@ def round_trip(model, stop, folder):
 
 def assert_same(results, least):
     """All variables are the same where both results have one value; least: number of variables."""
-    single = [np.unique(one.time, return_counts=True) for one in results]
-    common = np.intersect1d(*(t[count == 1] for t, count in single))
+    there, back = (t[count == 1] for t, count in (np.unique(x.time, return_counts=True) for x in results))
+    common = np.intersect1d(there, back)
     assert common.size > 100
     names = [n for n in results[0].names if n in results[1].names]
     assert len(names) >= least
