@@ -29,6 +29,7 @@ SELECT = {
     StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
 }  # fmt: skip
 NO_FORCE = "no force for "  # begins the name of the equation that stands for a redundant constraint
+MOVED = 1e-12  # share of a start value from which it has been moved, not rounded
 LEAST_SAVING = 40  # nodes; each name is one more unknown for the tool that reads the text
 
 
@@ -65,6 +66,19 @@ class _Writer:
         self.orders = self._orders([e for one in on_instants for _, e in one.sides])
         self.whens = WhenEquations(self.flat, self.graph, LEAST_SAVING)
         self.syntax = self.whens.syntax
+        self.starts = self._starts()
+
+    def _starts(self) -> dict[str, ca.SX]:
+        """Start values that were moved, as they were found: who reads the text does not have to move them another way."""
+        started = [v for v in self.flat.variables if v.start is not None and not v.fixed]
+        names = [n for v in started for n in v.elements]
+        asked = [x for v in started for x in self.dae.table.numbers(ca.vertcat(*(v.start or ()))).tolist()]
+        found = self.dae.numbers(names, self.dae.start).tolist() if names else []
+        known = set(self.dae.known)
+        rows = zip(names, asked, found, strict=True)
+        return {
+            n: ca.SX(f) for n, a, f in rows if abs(f - a) > MOVED * max(abs(a), abs(f)) and n not in known
+        }
 
     def _orders(self, used: list[ca.SX]) -> dict[str, int]:
         """The highest derivative of each variable that the text needs; used: what it needs beside equations."""
@@ -195,7 +209,8 @@ class _Writer:
             values = getattr(variable, key)
             if values is None or (values[k].is_constant() and abs(float(values[k])) == float("inf")):
                 continue
-            found.append(f"{key}={self._expression(f'{variable.elements[k]}, {key}', values[k])}")
+            value = self.starts.get(variable.elements[k], values[k]) if key == "start" else values[k]
+            found.append(f"{key}={self._expression(f'{variable.elements[k]}, {key}', value)}")
         if variable.fixed or variable.elements[k] in self.whens.held:
             found.append("fixed=true")
         if variable.prefer in SELECT:
