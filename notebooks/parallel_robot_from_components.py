@@ -327,7 +327,10 @@ assert abs(inertia[2, 2] - weight / 9.81) < 1e-10  # kg: all move alike when the
 
 # %%
 print(
-    {format: len(gantry.equations(format).splitlines()) for format in ("text", "latex", "html", "base-modelica")},
+    {
+        format: len(gantry.equations(format).splitlines())
+        for format in ("text", "latex", "html", "base-modelica")
+    },
     "lines",
 )
 print(*gantry.equations("latex").splitlines()[:9], sep="\n")

@@ -10,6 +10,7 @@ Language Specification 3.6, chapters 2, 3 and 8; Modelica Change Proposal MCP-00
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.translated import Translated
@@ -17,10 +18,10 @@ from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
-from gantrytau.writing.graph import Graph, Node
+from gantrytau.writing.graph import Graph, Node, expressions
 from gantrytau.writing.modelica_syntax import quoted, string
-from gantrytau.writing.subexpressions import Text, located, written, written_at
-from gantrytau.writing.syntax import CHOICE, Written, write
+from gantrytau.writing.subexpressions import Text, located, worth_a_name, written, written_at
+from gantrytau.writing.syntax import CHOICE, Written, ordered, write
 from gantrytau.writing.text import friction_lines
 from gantrytau.writing.when_equations import WhenEquations
 
@@ -113,7 +114,9 @@ class _Writer:
             for name, node in propagated.items():
                 if not node.leaf:
                     named.setdefault(node, Written(quoted(name)))
-            text = written([*sides, *propagated.values()], self.syntax, named, saving=LEAST_SAVING)
+            roots = [*sides, *propagated.values()]
+            text = written(roots, self.syntax, named, saving=LEAST_SAVING)
+            self._start_shared(worth_a_name(roots, named, LEAST_SAVING))
         except ModelError:
             for equation in equations:  # one of them is at fault, and is named
                 written_at(equation.name, [equation.left, equation.right], self.syntax)
@@ -123,6 +126,20 @@ class _Writer:
         found = ["initial equation", *initial] if initial else []
         found += ["equation", *own, *self._derivatives(), *self._named(propagated, text, len(sides))]
         return [*found, *self.whens.lines(), *self._asserted(), *self._left_out()]
+
+    def _start_shared(self, nodes: list[Node]) -> None:
+        """Start values of shared subexpressions, without which an iteration may begin where they are not defined."""
+        made = expressions(ordered(nodes))
+        values = ca.SX(ca.vertcat(*(made[node] for node in nodes)))
+        leaves = ca.symvar(values)
+        names = [leaf.name() for leaf in leaves]
+        known = {**self.dae.table.values, "time": 0.0}
+        others = [n for n in names if n not in known]
+        known |= dict(zip(others, self.dae.numbers(others, self.dae.start) if others else (), strict=True))
+        found = ca.Function("starts", [ca.vertcat(*leaves)], [values])(ca.DM([known[n] for n in names]))
+        for number, value in enumerate(np.array(found).ravel(), start=1):
+            if np.isfinite(value):
+                self.starts[self.syntax.shared(number).text] = ca.SX(value)
 
     def _propagated(self) -> dict[str, Node]:
         nodes = self.graph.read(self.flat.definitions.values())
@@ -161,7 +178,8 @@ class _Writer:
             elif name in declared:
                 self.auxiliaries.append(self._declare("", *declared[name]))
             else:
-                self.auxiliaries.append(f'  Real {name} "shared subexpression";')
+                guess = f"(start={self._expression(name, self.starts[name])})" if name in self.starts else ""
+                self.auxiliaries.append(f'  Real {name}{guess} "shared subexpression";')
         return [f"  {name} = {expression};" for name, expression in own.items() if name not in constant]
 
     def _asserted(self) -> list[str]:

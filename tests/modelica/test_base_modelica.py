@@ -37,7 +37,7 @@ from gantrytau_models import (
 )
 from gantrytau_models.control.tracking import ControlledRobot
 from gantrytau_models.leadthrough.lead_through import LeadThrough
-from gantrytau_models.leadthrough.peg_control import PegControl
+from gantrytau_models.leadthrough.peg_in_hole import PegInHole
 from tests.families import first_of
 from tests.modelica.test_parser import HERE, read
 
@@ -113,7 +113,7 @@ LIBRARY = {
     "delta": (DeltaRobot, 0.1),
     "hexapod": (StewartPlatform, 0.1),
     "controlled": (lambda: ControlledRobot(prototypes.L1), 0.1),
-    "peg": (PegControl, 0.1),
+    "peg": (PegInHole, 0.05),
 }
 
 

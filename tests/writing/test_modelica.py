@@ -9,7 +9,7 @@ from gantrytau import Input, Model, Output, Parameter, Real, StateSelect, der, t
 from gantrytau.mechanics.translational import LinearFriction
 from gantrytau_models import GantryTau, Pendulum, prototypes
 from tests.answers.test_linearization import Oscillator
-from tests.writing.modelica_reader import read_modelica
+from tests.writing.modelica_reader import Evaluator, read_modelica
 from tests.writing.residuals import assert_same_residuals
 
 
@@ -48,7 +48,8 @@ def test_attributes_of_declarations():
     read = assert_same_residuals(translate(Started(), units=False))
     assert [read.symbols[n].comment for n in ("a", "x[1]")] == [r"the \"rate\"", r"place \\ way"]
     assert [read.attribute(f"x[{k}]", "fixed").value for k in (0, 1)] == [True, True]
-    assert read.attribute("w", "start").value == 1e-5
+    found = Evaluator(read, {}, {})(read.attribute("w", "start"))
+    assert found == pytest.approx(-0.75, rel=1e-9)  # w = 3 (w + 0.5), from where it is not moved again
     assert str(read.attribute("w", "stateSelect")) == "StateSelect.avoid"
     assert read.attribute("u", "unit").value == "m/s3"
     assert read.attribute("y", "start") is None
