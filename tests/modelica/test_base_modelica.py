@@ -7,6 +7,7 @@ from gantrytau import (
     Discrete,
     Mode,
     Model,
+    ModelError,
     Parameter,
     Real,
     delay,
@@ -130,5 +131,16 @@ def test_what_only_base_modelica_says():
     assert found.final("x[1]") == pytest.approx(2 * np.exp(-2.0), abs=1e-8)
     assert found.final("z[3]") == pytest.approx(3 + 2 * (1 - np.exp(-2.0)), abs=1e-8)
     assert found.final("n") == 5
+
+
+def test_base_modelica_has_one_model(tmp_path):
+    (tmp_path / "none.mo").write_text("//! base 3.6.0\npackage P\n  record R\n  end R;\nend P;\n")
+    with pytest.raises(
+        ModelError, match="none.mo, line 2, column 9: found 0 models, expected one package with"
+    ):
+        load_modelica(tmp_path / "none.mo")
+
+
+def test_a_tree_of_base_modelica_is_written():
     tree = read_tree(HERE / "base.mo")
     assert read(written(tree)) == tree

@@ -143,9 +143,15 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     found = read_tree(path)
     around = root
     if found.source.base:  # the one model, which has the name of the package around it
-        (package,) = found.classes
+        (package, *others) = found.classes
         around = ClassScope(replace(package, name=""), found.source, root)
-        return [one for one in around.classes.values() if one.definition.kind == "model"]
+        models = [one for one in around.classes.values() if one.definition.kind == "model"]
+        if others or len(models) != 1:
+            count = f"{1 + len(others)} packages" if others else f"{len(models)} models"
+            around.refuse(
+                package.at, f"found {count}, expected one package with one model, as Base Modelica has"
+            )
+        return models
     for part in (found.within or "").split(".") if found.within else ():
         inner = around.own_class(part)
         if inner is None:  # the package itself is not given
