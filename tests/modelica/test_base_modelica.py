@@ -136,7 +136,7 @@ def test_what_only_base_modelica_says():
 def test_base_modelica_has_one_model(tmp_path):
     (tmp_path / "none.mo").write_text("//! base 3.6.0\npackage P\n  record R\n  end R;\nend P;\n")
     with pytest.raises(
-        ModelError, match="none.mo, line 2, column 9: found 0 models, expected one package with"
+        ModelError, match=r"none\.mo, line 2, column 9: found 0 models, expected one package with"
     ):
         load_modelica(tmp_path / "none.mo")
 
