@@ -17,7 +17,7 @@ from gantrytau.writing.subexpressions import located, worth_a_name
 from gantrytau.writing.syntax import AND, Written, write
 
 BEGUN = quoted("=begun")
-ONCE = 1e60  # s, a period that no simulation reaches the end of
+ONCE = 1e9  # s, a period that no simulation reaches the end of
 NEXT_SAMPLE = re.compile(r"(.*\.)?next_sample_\d+")  # holds the next instant of a `sample` in Modelica text
 
 
@@ -74,7 +74,7 @@ class WhenEquations:
     def lines(self) -> Iterator[str]:
         """The whens, line by line."""
         if self.declared:
-            yield from (f"  when sample(0, {ONCE}) then", f"    {BEGUN} = 1;", "  end when;")
+            yield from (f"  when sample(0, {ONCE:g}) then", f"    {BEGUN} = 1;", "  end when;")
         periods: dict[str, list[Sampled]] = {}
         for one in self.flat.sampled:
             with located(one.label):
@@ -91,10 +91,22 @@ class WhenEquations:
             with located(one.label):
                 yield f"  {word} {self._condition(one)} then"
                 yield from (f"    {action};" for action in self._actions(one))
+                others = self._chain(number) - {name for name, _ in one.assignments}
+                yield from (f"    {quoted(name)} = pre({quoted(name)});" for name in sorted(others))
             last = not any(later.after == number for later in self.flat.whens)
             word = "when" if last else "elsewhen"
             if last:
                 yield f"  end when {string(place_of(one.path, one.model, one.number))};"
+
+    def _chain(self, number: int) -> set[str]:
+        """Names that the branches of the chain of a when set, all of which each branch has to set in Modelica."""
+        whens = self.flat.whens
+        while whens[number].after >= 0:
+            number = whens[number].after
+        found = {name for name, _ in whens[number].assignments}
+        while (number := next((k for k, one in enumerate(whens) if one.after == number), -1)) >= 0:
+            found |= {name for name, _ in whens[number].assignments}
+        return found
 
     def _sampled(self, one: Sampled) -> str:
         if f"={one.name}" in self.aside:

@@ -10,6 +10,7 @@ from gantrytau import (
     ModelError,
     Parameter,
     Real,
+    SolveError,
     delay,
     der,
     load_modelica,
@@ -19,6 +20,7 @@ from gantrytau import (
     sampled,
     simulate,
     terminate,
+    time,
     transition,
     translate,
     when,
@@ -65,14 +67,31 @@ class Ball(Model):
         yield require(self.e < 1, "expected a loss")
 
 
-def round_trip(model, stop, folder):
-    """Results of a model, and of what is read from its text."""
-    dae = translate(model, units=False, events=True)
-    (folder / "model.mo").write_text(dae.equations("base-modelica"))
+class Tie(Model):
+    """Two transitions that may act at once, of which none comes first."""
+
+    x = Real(unit="1", start=0.0, fixed=True)
+    mode = Mode("near", "far", "late")
+
+    def equations(self):
+        yield der(self.x) == 1
+        yield transition(self.mode, "near", "far", self.x >= 0.5)
+        yield transition(self.mode, "near", "late", time >= 0.5)
+
+
+def written_and_read(model, folder):
+    """The class that is read from the text of a model."""
+    text = translate(model, units=False, events=True).equations("base-modelica")
+    (folder / "model.mo").write_text(text)
     library = load_modelica(folder / "model.mo")
     assert library.names == (type(model).__name__,)
-    back = library[library.names[0]]()
-    return [simulate(one, stop=stop, tolerance=1e-10) for one in (dae, back)]
+    return library[library.names[0]]
+
+
+def round_trip(model, stop, folder):
+    """Results of a model, and of what is read from its text."""
+    both = translate(model, units=False, events=True), written_and_read(model, folder)()
+    return [simulate(one, stop=stop, tolerance=1e-10) for one in both]
 
 
 def assert_same(results, least):
@@ -95,11 +114,13 @@ def test_events_come_back(tmp_path):
     assert (back.final("n"), back["mode"][1]) == (6, 1)
 
 
+def test_a_when_that_fails_comes_back(tmp_path):
+    with pytest.raises(SolveError, match="two transitions of mode out of near may act at once"):
+        simulate(written_and_read(Tie(), tmp_path)(), stop=1.0)
+
+
 def test_a_text_that_came_back_goes_out_again(tmp_path):
-    dae = translate(Ball(), units=False, events=True)
-    (tmp_path / "model.mo").write_text(dae.equations("base-modelica"))
-    back = load_modelica(tmp_path / "model.mo")["Ball"]
-    assert_same(round_trip(back(), 1.0, tmp_path), 6)
+    assert_same(round_trip(written_and_read(Ball(), tmp_path)(), 1.0, tmp_path), 6)
 
 
 LIBRARY = {
