@@ -61,12 +61,12 @@ class Dae(Translated):
         """
         return assemble(self, form, causality)
 
-    def equations(self, format: Literal["text", "latex", "html", "modelica"] = "text") -> str:
+    def equations(self, format: Literal["text", "latex", "html", "base-modelica"] = "text") -> str:
         """The equations, written out: every block with the component equations it comes from, or the flat model.
 
         text: one line per solved unknown; latex: align environments to be included in a document (amsmath);
-        html: one page by component, by block, and a table of quantities; modelica: the flat model as a class
-        that Modelica tools read. With find= of `translate`, all but modelica have only what the wanted names depend on,
+        html: one page by component, by block, and a table of quantities; base-modelica: the flat model as a class
+        that Modelica tools read. With find= of `translate`, all but base-modelica have only what the wanted names depend on,
         states being known. Raises ModelError for another format or a function that the format lacks.
         """
         return write_equations(self, format, lambda: str(self.diagnosis))

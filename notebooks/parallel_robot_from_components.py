@@ -322,12 +322,15 @@ assert np.abs(inertia - inertia.T).max() < 1e-10 * inertia.max()
 assert abs(inertia[2, 2] - weight / 9.81) < 1e-10  # kg: all move alike when the plate is lifted
 
 # %% [markdown]
-# The whole model is written as text, as LaTeX for a report, as one HTML page, or as flat Modelica, and every function
+# The whole model is written as text, as LaTeX for a report, as one HTML page, or as Base Modelica, and every function
 # as C for a controller.
 
 # %%
 print(
-    {format: len(gantry.equations(format).splitlines()) for format in ("text", "latex", "html", "modelica")},
+    {
+        format: len(gantry.equations(format).splitlines())
+        for format in ("text", "latex", "html", "base-modelica")
+    },
     "lines",
 )
 print(*gantry.equations("latex").splitlines()[:9], sep="\n")

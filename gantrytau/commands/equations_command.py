@@ -55,7 +55,7 @@ def equations(
     """Write the equations of a model, sorted in the order in which they are solved.
 
     Which way they are solved is your choice: given the tool and finding the carts, as in the example below, they
-    are inverse kinematics. With --find, only what it needs is written (modelica: always all). Derivatives are called
+    are inverse kinematics. With --find, only what it needs is written (base-modelica: always all). Derivatives are called
     der(x). With --c the same becomes a C function.
     """
     with reporting(json, source_of(model)):

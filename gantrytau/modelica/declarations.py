@@ -155,6 +155,8 @@ class DeclarationReader(ExpressionReader):
     def class_kind(self) -> tuple[tuple[str, ...], str]:
         """The words before the name of a class: its prefixes, and its kind."""
         prefixes = self.prefixes(*BEFORE_KINDS)
+        if prefixes == ("pure",) and self.source.base:
+            prefixes += self.prefixes("constant")
         if self.kind == "operator" and self.next_kind in ("function", "record"):
             prefixes += (self.advance(),)
         if self.kind not in KINDS:

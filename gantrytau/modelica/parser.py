@@ -3,6 +3,7 @@
 import os
 
 from gantrytau.modelica import tree
+from gantrytau.modelica.base_modelica import without_guesses
 from gantrytau.modelica.declarations import CLASS_BEGINS, ELEMENT_PREFIXES
 from gantrytau.modelica.equations import ENDS, EquationReader
 from gantrytau.modelica.source import SourceText
@@ -113,6 +114,10 @@ class Parser(EquationReader):
                     external = self.external_function()
                 elif self.section_begins():
                     sections.append((self.at, self.section_kind(), []))
+                elif self.kind == "parameter" and self.next_kind == "equation":
+                    sections.append((self.at, f"{self.advance()} {self.advance()}", [self.item("equation")]))
+                    sections.append((self.at, "", []))
+                    self.close()
                 elif self.kind in ENDS:
                     self.stray()
                 elif kind in ELEMENT_SECTIONS and (section := self.forgotten_section()):
@@ -131,6 +136,7 @@ class Parser(EquationReader):
                     self.advance()
         self.end_of_class()
         shown = tuple(tree.ClassSection(a, word, tuple(own)) for a, word, own in sections if word or own)
+        shown = without_guesses(shown) if self.source.base else shown
         return tree.Composition(at, extends, arguments, shown, external), annotation
 
     def section_kind(self) -> str:

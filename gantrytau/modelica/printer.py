@@ -4,13 +4,15 @@ from collections.abc import Iterable, Iterator
 
 from gantrytau.modelica import tree
 from gantrytau.modelica.expressions import AND, OR, PRECEDENCE, RELATION, SUM, TERM
+from gantrytau.modelica.tokens import spelled
 
 OPERAND = 8  # above all operators
 
 
 def written(file: tree.StoredDefinition) -> str:
     """The text of a tree; `parse` makes an equal tree of it."""
-    lines = [] if file.within is None else [f"within {file.within};".replace(" ;", ";")]
+    lines = ["//! base 3.6.0"] if file.source.base else []
+    lines += [] if file.within is None else [f"within {file.within};".replace(" ;", ";")]
     for one in file.classes:
         lines += [*_class(one), ""]
     return "\n".join(lines)
@@ -26,7 +28,7 @@ def _expression(e: tree.Expression) -> tuple[str, int]:
     """The text of an expression and how strongly its outermost operator binds."""
     write = expression_written
     if isinstance(e, tree.ComponentReference):
-        return ".".join(name + _subscripts(subscripts) for name, subscripts in e.parts), OPERAND
+        return ".".join(spelled(name) + _subscripts(subscripts) for name, subscripts in e.parts), OPERAND
     if isinstance(e, tree.Number):
         return e.text, OPERAND
     if isinstance(e, tree.Binary):
@@ -85,7 +87,7 @@ def _inside(
 ) -> str:
     """What stands between the brackets of a call or an array."""
     texts = [expression_written(one) for one in arguments]
-    texts += [f"{name} = {expression_written(value)}" for name, value in named]
+    texts += [f"{spelled(name)} = {expression_written(value)}" for name, value in named]
     return ", ".join(texts) + (f" {_iterators(iterators)}" if iterators else "")
 
 
@@ -112,7 +114,8 @@ def _argument(argument: tree.AnyArgument) -> str:
         left_out = argument.left_out
         return f"break {left_out if isinstance(left_out, str) else _connect(left_out)}"
     if isinstance(argument, tree.Argument):
-        words = [*argument.prefixes, argument.name + _modification(argument.modification)]
+        name = ".".join(map(spelled, argument.name.split(".")))
+        words = [*argument.prefixes, name + _modification(argument.modification)]
         return " ".join(words) + _description(argument.description)
     element = argument.element
     redeclare = element.prefixes[:1] == ("redeclare",)
@@ -162,7 +165,13 @@ def _clause(clause: tree.ComponentClause, prefixes: tuple[str, ...]) -> str:
 def _component(one: tree.ComponentDeclaration) -> str:
     """A component with its modification, condition and description."""
     condition = "" if one.condition is None else f" if {expression_written(one.condition)}"
-    return one.name + _subscripts(one.subscripts) + _modification(one.modification) + condition + _about(one)
+    return (
+        spelled(one.name)
+        + _subscripts(one.subscripts)
+        + _modification(one.modification)
+        + condition
+        + _about(one)
+    )
 
 
 def _class(one: tree.ClassDefinition, prefixes: tuple[str, ...] | None = None) -> Iterator[str]:
@@ -171,11 +180,11 @@ def _class(one: tree.ClassDefinition, prefixes: tuple[str, ...] | None = None) -
     body, tail = one.body, f"{_constraint(one.constraint)};"
     if isinstance(body, tree.Composition):
         extends = "extends " if body.extends else ""
-        yield f"{words} {extends}{one.name}{_arguments(body.arguments)}{_description(one.description)}"
+        yield f"{words} {extends}{spelled(one.name)}{_arguments(body.arguments)}{_description(one.description)}"
         yield from _composition(body)
         if one.annotation is not None:
             yield f" {_annotation(one.annotation)};"
-        yield f"end {one.name}{tail}"
+        yield f"end {spelled(one.name)}{tail}"
         return
     if isinstance(body, tree.ShortClass):
         what = " ".join((*body.prefixes, body.type + _subscripts(body.subscripts))) + _arguments(
@@ -185,14 +194,14 @@ def _class(one: tree.ClassDefinition, prefixes: tuple[str, ...] | None = None) -
         what = f"der({', '.join((body.function, *body.inputs))})"
     else:
         what = f"enumeration({_literals(body)})"
-    yield f"{words} {one.name} = {what}{_about(one)}{tail}"
+    yield f"{words} {spelled(one.name)} = {what}{_about(one)}{tail}"
 
 
 def _literals(body: tree.Enumeration) -> str:
     """The values of an enumeration."""
     if body.literals is None:
         return ":"
-    return ", ".join(one.name + _about(one) for one in body.literals)
+    return ", ".join(spelled(one.name) + _about(one) for one in body.literals)
 
 
 def _composition(body: tree.Composition) -> Iterator[str]:

@@ -18,6 +18,11 @@ class SourceText:
     text: str
     optimica: bool = False
 
+    @property
+    def base(self) -> bool:
+        """Whether it is in Base Modelica, as its first line says."""
+        return self.text.startswith("//! base ")
+
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "SourceText":
         """The text of a file in UTF-8; ModelError for a file that cannot be read or has another encoding."""

@@ -4,6 +4,7 @@ import re
 from typing import NoReturn
 
 from gantrytau.border.refusal import ModelError
+from gantrytau.modelica.base_modelica import decoded
 from gantrytau.modelica.source import SourceText
 
 KEYWORDS = frozenset(
@@ -26,6 +27,10 @@ TOKEN = re.compile(
     |(?P<other>(?s:.))""",
     re.VERBOSE,
 )
+DECORATED = re.compile(
+    TOKEN.pattern.replace("(?:", "(?:@[0-9]+|", 1), re.VERBOSE
+)  # of Base Modelica, where @1 says nothing
+PLAIN_NAME = re.compile(r"\.?[A-Za-z_]\w*|'.*'", re.ASCII)
 UNCLOSED = {
     "/*": "found a comment that no '*/' closes",
     '"': "found a string that no quote closes",
@@ -34,6 +39,13 @@ UNCLOSED = {
 SECTIONS = frozenset({"public", "protected", "equation", "algorithm", "constraint", "external"})
 BLOCKS = frozenset({"if", "for", "when", "while"})
 MOST = 20  # messages of a file
+
+
+def spelled(name: str) -> str:
+    """A name as it stands in a text: in quotes if it is no identifier, as decoded ones of Base Modelica may be."""
+    if not name or (PLAIN_NAME.fullmatch(name) and name not in KEYWORDS - {"der", "initial", "pure"}):
+        return name
+    return "'" + re.sub(r"(['\\])", r"\\\1", name) + "'"
 
 
 class Faulty(Exception):
@@ -61,13 +73,17 @@ class Tokens:
     def _split(self) -> None:
         kinds, texts, starts = self.kinds, self.texts, self.starts
         keywords = KEYWORDS | OPTIMICA if self.source.optimica else KEYWORDS
-        for found in TOKEN.finditer(self.source.text):
+        base = self.source.base
+        pattern = DECORATED if base else TOKEN
+        for found in pattern.finditer(self.source.text):
             kind = found.lastgroup
             if kind == "skip":
                 continue
             text = found[kind] if kind else ""
             if kind == "sign" or (kind == "name" and text in keywords):
                 kind = text
+            elif base and kind == "name" and text[0] == "'":
+                text = decoded(text)
             elif kind == "open":
                 self.unclosed = found.start(), text
                 break

@@ -8,11 +8,11 @@ from gantrytau.compiler.translated import Translated
 
 
 def write_equations(
-    dae: Translated, format: Literal["text", "latex", "html", "modelica"], summary: Callable[[], str]
+    dae: Translated, format: Literal["text", "latex", "html", "base-modelica"], summary: Callable[[], str]
 ) -> str:
-    """The equations as "text", "latex", "html" (blocks, with their origin) or "modelica" (the flat model).
+    """The equations as "text", "latex", "html" (blocks, with their origin) or "base-modelica" (the flat model).
 
-    Of a translation with `find=`, what the wanted names depend on, but "modelica" is the whole model always.
+    Of a translation with `find=`, what the wanted names depend on, but "base-modelica" is the whole model always.
     summary: what the page opens with. Raises ModelError for another format, and for a function that the
     format has no words for.
     """
@@ -29,6 +29,6 @@ def write_equations(
         from gantrytau.writing.equations_page.equations_page import html_page
 
         return html_page(dae, "" if dae.request.find else summary())
-    from gantrytau.writing.modelica import modelica_text
+    from gantrytau.writing.base_modelica import base_modelica_text
 
-    return modelica_text(dae)
+    return base_modelica_text(dae)

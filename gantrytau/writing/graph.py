@@ -29,6 +29,10 @@ COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 OPPOSITE = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 MIRRORED = {"<": ">", "<=": ">=", "==": "==", "!=": "!="}
 BOOLEANS = frozenset((*OPPOSITE, "and", "or", "not"))
+CODES = {word: code for code, word in (*FUNCTIONS.items(), *COMPARISONS.items())} | {
+    "add": ca.OP_ADD, "sub": ca.OP_SUB, "mul": ca.OP_MUL, "div": ca.OP_DIV, "neg": ca.OP_NEG,
+    "and": ca.OP_AND, "or": ca.OP_OR, "not": ca.OP_NOT,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,24 @@ class Node:
     def negative(self) -> bool:
         """Whether it is written with a minus in front."""
         return self.operation == "neg" or (self.operation == "number" and float(self.value) < 0)
+
+
+def expressions(nodes: Iterable[Node]) -> dict[Node, ca.SX]:
+    """Nodes as expressions of CasADi; nodes: each after its arguments."""
+    found: dict[Node, ca.SX] = {}
+    for node in nodes:
+        arguments = [found[a] for a in node.arguments]
+        if node.leaf:
+            name = str(node.value)
+            found[node] = ca.SX(float(node.value)) if node.operation == "number" else ca.SX.sym(name)
+        elif node.operation == "select":
+            found[node] = ca.if_else(*arguments)
+        elif node.operation in (">", ">="):
+            found[node] = ca.SX.binary(CODES["<" if node.operation == ">" else "<="], *reversed(arguments))
+        else:
+            make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
+            found[node] = make(CODES[node.operation], *arguments)
+    return found
 
 
 def whole_power(node: Node) -> tuple[Node, float]:

@@ -1,9 +1,10 @@
 """Expressions, names and strings in Modelica (Language Specification 3.6, sections 2.3 and 3.7)."""
 
-from collections.abc import Collection
+from collections.abc import Mapping
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.symbols import derivative_name, split_derivative
+from gantrytau.writing.instants_written import without_pre
 from gantrytau.writing.syntax import AND, CHOICE, OR, POWER, PRODUCT, SUM, Arguments, Written
 from gantrytau.writing.text import WORDS, PlainSyntax
 
@@ -14,23 +15,12 @@ FUNCTIONS = {
     "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "floor": "floor", "ceil": "ceil",
     "min": "min", "max": "max", "fmod": "rem",
 }  # fmt: skip
-KEYWORDS = """algorithm and annotation block break class connect connector constant constrainedby der discrete
-    each else elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow
-    for function if import impure in initial inner input loop model not operator or outer output package parameter
-    partial protected public pure record redeclare replaceable return stream then true type when while within
-    Real Integer Boolean String"""
 
 
 def quoted(name: str) -> str:
     """A name as a quoted identifier; letters beyond ASCII, which may not stand there, as their code."""
     escaped = name.replace("\\", "\\\\").replace("'", "\\'")
     return "'" + "".join(c if c.isascii() else f"U+{ord(c):04X}" for c in escaped) + "'"
-
-
-def class_name(name: str) -> str:
-    """The name of a class, quoted only where it has to be."""
-    plain = name.isascii() and name.isidentifier() and name not in KEYWORDS.split()
-    return name if plain else quoted(name)
 
 
 def string(text: str) -> str:
@@ -40,12 +30,12 @@ def string(text: str) -> str:
 
 
 class ModelicaSyntax(PlainSyntax):
-    """Modelica; `lowered` are the variables whose first derivative is a variable of its own."""
+    """Modelica; spoken: texts of names that are no variables there."""
 
     name = "Modelica"
 
-    def __init__(self, lowered: Collection[str] = ()):
-        self._lowered = frozenset(lowered)
+    def __init__(self, spoken: Mapping[str, Written] | None = None):
+        self._spoken = {} if spoken is None else spoken
 
     def number(self, value: float) -> Written:
         """A number; ModelError for an infinite one."""
@@ -54,15 +44,22 @@ class ModelicaSyntax(PlainSyntax):
         return super().number(value)
 
     def symbol(self, name: str) -> Written:
-        """A quoted name, the derivative of one, or `time`."""
+        """A quoted name, the derivative of one, its value just before an instant, or `time`."""
         base, order = split_derivative(name)
-        if order == 0:
-            return Written("time" if name == "time" else quoted(name))
-        return Written(f"der({quoted(derivative_name(base, order - 1))})")
+        if order:
+            return Written(f"der({self.variable(derivative_name(base, order - 1))})")
+        if name in self._spoken or name == "time":
+            return self._spoken.get(name, Written("time"))
+        own = without_pre(name)
+        return Written(quoted(name) if own == name else f"pre({quoted(own)})")
+
+    def variable(self, name: str) -> str:
+        """The name of a variable; '=der(x)' of one that is the derivative of another."""
+        return quoted(f"={name}" if split_derivative(name).order else name)
 
     def shared(self, number: int) -> Written:
-        """'shared 1', which is no name that Python could have."""
-        return Written(quoted(f"shared {number}"))
+        """'=1', which is no name that Python could have."""
+        return Written(quoted(f"={number}"))
 
     def apply(self, operation: str, arguments: Arguments) -> Written | None:
         """Operators, `if`, the built-in functions, and what can be said with them."""

@@ -1,6 +1,9 @@
 """The blocks of a Dae as plain text, in the order of solution, with the component equation each line comes from."""
 
+from dataclasses import replace
+
 from gantrytau.compiler.translated import Translated
+from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.writing.excerpt import Excerpt, excerpt
 from gantrytau.writing.instants_written import AtInstants, at_instants, line_written
 from gantrytau.writing.sections import Section, section_text
@@ -76,9 +79,11 @@ def _state(state: tuple[str, str]) -> str:
     return name if name == symbol else f"{name} = {symbol}"
 
 
-def event_lines(dae: Translated) -> list[str]:
-    """What is set at instants, line by line."""
-    return [line for one in at_instants(dae.flat) for line in _instant(one)]
+def friction_lines(flat: FlatModel) -> list[str]:
+    """Friction that sticks, line by line."""
+    return [
+        line for one in at_instants(replace(flat, sampled=(), whens=(), delays=())) for line in _instant(one)
+    ]
 
 
 def _instant(one: AtInstants) -> list[str]:

@@ -49,7 +49,7 @@ def test_the_equations_go_to_a_file(run, answer, tmp_path):
     assert "text" not in told
 
 
-@pytest.mark.parametrize("format", ["latex", "html", "modelica"])
+@pytest.mark.parametrize("format", ["latex", "html", "base-modelica"])
 def test_other_formats(run, format):
     found = run("equations", "Pendulum", "--format", format)
     assert found.exit_code == 0, found.output

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -260,3 +261,16 @@ def test_a_class_of_modelica_text_is_a_model(run):
     assert json.loads(said.stdout)["ended"] == "enough"
     assert "did you mean 'Motions.Ball'" in run("simulate", f"{file}:Motions.Bal").stderr
     assert "name one, as motions.mo:Motions.Ball" in " ".join(run("check", file).stderr.split())
+
+
+def test_packages_of_a_model_are_found_in_a_library(run, fails, tmp_path, monkeypatch):
+    monkeypatch.delenv("MODELICAPATH", raising=False)
+    drive = Path(__file__).parents[1] / "modelica" / "drive.mo"
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "Drive.mo").write_text(drive.read_text())
+    file = tmp_path / "use.mo"
+    file.write_text("model Use\n  Drive.Rc rc;\nend Use;\n")
+    assert run("check", file, "--library", tmp_path / "parts").exit_code == 0
+    assert "MODELICAPATH" not in os.environ
+    assert "A library is given by its folder" in fails(FAULT, "check", file)
+    assert "--library" in fails(MISUSE, "check", file, "--library", tmp_path / "none")

@@ -319,7 +319,7 @@ def test_equations_are_written_with_their_whens():
     text = translate(Ball(), events=True).equations()
     assert "when h <= 0: v := -e*v, bounces := pre(bounces) + 1    # from the model" in text
     lines = ("when(self.n > 3, terminate('four')).elsewhen(self.h < 0, self.n == pre(self.n) + 1)",)
-    for format in ("text", "latex", "html", "modelica"):
+    for format in ("text", "latex", "html"):
         written = translate(falling(*lines, **COUNT), events=True).equations(format)
         assert "elsewhen" in written
         assert "terminate: four" in written

@@ -105,7 +105,7 @@ def test_texts_say_what_it_does():
     dae = translate(Block(), events=True)
     law = "floor.f = sign(floor.v)*floor.f_c + floor.f_v*floor.v"
     assert f"friction: {law}; at rest as floor.v = 0 needs, up to floor.f_s" in dae.equations()
-    assert "at rest as floor.v = 0 needs" in dae.equations("modelica")
+    assert "at rest as floor.v = 0 needs" in dae.equations("base-modelica")
     assert r"; at rest as $\mathit{floor}.v$ = 0 needs, up to $\mathit{floor}.f_{s}$" in dae.equations(
         "latex"
     )

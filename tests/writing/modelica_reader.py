@@ -1,4 +1,4 @@
-"""Reads flat Modelica with pymoca, an independent parser, and evaluates its equations at given numbers.
+"""Reads the equations of Base Modelica with pymoca, an independent parser, and evaluates its equations at given numbers.
 
 A robot has thousands of lines that differ in nothing but quoted names and strings. Each of these is one token,
 whatever it says, so lines that are alike otherwise are parsed once, and the names put back into copies.
@@ -56,8 +56,9 @@ class ModelicaClass:
 
 
 def plain(name: str) -> str:
-    """A quoted identifier without its quotes."""
-    return name[1:-1].replace("\\'", "'").replace("\\\\", "\\") if name.startswith("'") else name
+    """A quoted identifier without its quotes, and without the sign before names that are made."""
+    bare = name[1:-1].replace("\\'", "'").replace("\\\\", "\\") if name.startswith("'") else name
+    return bare.removeprefix("=")
 
 
 def read_modelica(text: str) -> ModelicaClass:
@@ -65,7 +66,8 @@ def read_modelica(text: str) -> ModelicaClass:
     # pymoca's cache would outlive the test in the home folder
     tree = parser.parse(text, bypass_cache=True)
     assert tree is not None, "pymoca found an error of syntax"
-    (found,) = (c for c in tree.classes.values() if c.type == "model")  # the others are Modelica's own types
+    places = [tree, *tree.classes.values()]
+    (found,) = (c for at in places for c in at.classes.values() if c.type == "model")
     return ModelicaClass(found)
 
 
@@ -75,7 +77,11 @@ SECTIONS = ("initial equation", "equation")
 
 def read_by_lines(text: str) -> ModelicaClass:
     """Like `read_modelica`, but fast, from a long text with one declaration or equation on each line."""
-    heading, *body, end = [line for line in text.splitlines() if not line.lstrip().startswith("//")]
+    _, heading, *body, end, _ = [
+        line
+        for line in text.splitlines()
+        if not re.match(r"//|  (  |//|when |elsewhen |end when|assert\()", line)
+    ]
     alike: dict[tuple[str, str], int] = {}  # number of a line without its names, by its section
     lines: list[tuple[str, int, list[str]]] = []
     section = ""

@@ -5,7 +5,7 @@ import numpy as np
 
 from gantrytau import Dae, Model, translate
 from gantrytau.language.symbols import derivative_name, split_derivative
-from gantrytau.writing.modelica import independent_equations
+from gantrytau.writing.base_modelica import independent_equations
 from tests.writing.modelica_reader import Evaluator, ModelicaClass, plain, read_by_lines
 
 
@@ -18,7 +18,7 @@ def assert_same_residuals(
     one tells smooth equations apart, more are for the branches of `if`.
     """
     dae = model if isinstance(model, Dae) else translate(model)
-    read = read_by_lines(dae.equations("modelica"))
+    read = read_by_lines(dae.equations("base-modelica"))
     assert len(read.unknowns) == len(read.tree.equations)
     assert set(read.named("input")) == set(dae.known)
     assert set(read.named("parameter")) == set(dae.parameters)

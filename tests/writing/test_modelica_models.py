@@ -13,7 +13,7 @@ from gantrytau.language.declarations import Array
 from gantrytau.mechanics import multibody, rotational, translational
 from gantrytau.mechanics.filters import LowPass
 from gantrytau.mechanics.gears import BallScrew, ElasticGear, IdealGear, RackAndPinion
-from gantrytau.writing.modelica import independent_equations
+from gantrytau.writing.base_modelica import independent_equations
 from gantrytau_models import (
     DeltaRobot,
     F1GantryTau,
@@ -184,7 +184,7 @@ def test_ball_joints_where_loops_are_opened_have_no_coordinates():
 
 @pytest.mark.parametrize("model", [Pendulum(), Gears()], ids=["pendulum", "gears"])
 def test_reading_lines_that_are_alike_once_is_reading_all(model):
-    text = translate(model).equations("modelica")
+    text = translate(model).equations("base-modelica")
     quick, whole = (contents(read(text).tree) for read in (read_by_lines, read_modelica))
     assert quick == whole
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,6 +22,7 @@ from gantrytau.commands.printing.spelling import RUNNING, Spelling
 
 USAGE_ERROR: Any = typer.BadParameter.__mro__[1]  # of Click, which some versions of Typer bring along
 MISSING: Any = next(c for c in typer.BadParameter.__subclasses__() if c.__name__ == "MissingParameter")
+NAMED = ("MODEL", "PROBLEM")  # what has its name in an argument or option may stand in Modelica text
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # an output that takes no more
 PLAINLY = {
     "Input should be a valid number, unable to parse string as a number": "expected a number, as 0.5",
@@ -136,8 +137,42 @@ def _loaded(name: str, place: str, example: str) -> Any:
         alone = typer.Typer(add_completion=False)
         alone.command(name, epilog=f"Example: {example}")(getattr(module, name))
         found = typer.main.get_command(alone)
+        if any(one.metavar in NAMED for one in found.params):
+            found.params.append(_library_option())
     tidy(found)
     return found
+
+
+def _look_in(
+    context: typer.Context,
+    library: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Look here for packages that Modelica text needs, before MODELICAPATH. Repeatable.",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """`--library`: load_modelica, here and in the processes of this command, looks in some folders first while it runs."""
+    old = os.environ.get("MODELICAPATH")
+    for folder in library or ():
+        if not Path(folder).is_dir():
+            raise typer.BadParameter(f"found no folder '{folder}', expected one that holds packages")
+    if library:
+        os.environ["MODELICAPATH"] = os.pathsep.join([*library, *filter(None, [old])])
+        back = os.environ.pop if old is None else os.environ.__setitem__
+        context.call_on_close(lambda: back("MODELICAPATH", old or ""))
+
+
+def _library_option() -> Any:
+    """`--library` of a command that takes a model by its name."""
+    alone = typer.Typer(add_completion=False)
+    alone.command()(_look_in)
+    (option,) = (one for one in typer.main.get_command(alone).params if one.name == "library")
+    option.expose_value = False
+    option.callback = lambda ctx, parameter, folders: _look_in(ctx, folders)
+    return option
 
 
 def _first_line(name: str, place: str) -> str:

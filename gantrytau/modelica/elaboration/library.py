@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -65,7 +66,7 @@ class ModelicaLibrary:
             return [name for file in files for name in self._add(file)]
         found = [package_in(path, self.root)] if path.is_dir() else _in_file(path, self.root)
         for one in found:
-            around = one.around or self.root
+            around = self.root if one.source.base else one.around or self.root
             if one.definition.name in around.classes:
                 one.refuse(one.definition.at, f"found a second class {one.name}, expected one")
             around.classes[one.definition.name] = one
@@ -74,14 +75,17 @@ class ModelicaLibrary:
     @property
     def names(self) -> tuple[str, ...]:
         """Full names of the models, blocks, connectors and records in the given files."""
-        left = [self.root.find_class(name, 0) for name in self.given]
+        left = [*map(self._found, self.given)]
         for one in left:
             left += [inner for inner in one.classes.values() if inner.around is one]
         return tuple(sorted(one.name for one in left if one.definition.kind in self.kinds))
 
+    def _found(self, name: str) -> ClassScope:
+        return self.root.classes.get(name) or self.root.find_class(name, 0)
+
     def kind_of(self, name: str) -> str:
         """The word before the name of a class: model, block, connector, ...; "" for a partial one."""
-        definition = self.root.find_class(name, 0).definition
+        definition = self._found(name).definition
         return "" if "partial" in definition.prefixes else definition.kind
 
     def __getitem__(self, name: str) -> type[Any]:
@@ -90,7 +94,7 @@ class ModelicaLibrary:
             raise ModelError(f"found {name!r}, expected the full name of a class, as 'Package.Model'")
         if name not in self._classes:
             scope: ClassScope | None = self.root
-            for part in name.split("."):
+            for part in [name] if name in self.root.classes else name.split("."):
                 scope = scope.inherited_class(part) if scope else None
             if scope is None:
                 raise ModelError(f"found the name '{name}', expected a class{did_you_mean(name, self.names)}")
@@ -177,6 +181,16 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     """The classes of a file, within the package that it names if that is there."""
     found = read_tree(path)
     around = root
+    if found.source.base:  # the one model, which has the name of the package around it
+        (package, *others) = found.classes
+        around = ClassScope(replace(package, name=""), found.source, root)
+        models = [one for one in around.classes.values() if one.definition.kind == "model"]
+        if others or len(models) != 1:
+            count = f"{1 + len(others)} packages" if others else f"{len(models)} models"
+            around.refuse(
+                package.at, f"found {count}, expected one package with one model, as Base Modelica has"
+            )
+        return models
     for part in (found.within or "").split(".") if found.within else ():
         inner = around.own_class(part)
         if inner is None:  # the package itself is not given

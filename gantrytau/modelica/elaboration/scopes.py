@@ -362,7 +362,7 @@ class ClassScope:
 
     def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""
-        first, *rest = name.split(".")
+        first, *rest = [name] if self.source.base and self.first(name) else name.split(".")
         start = self.root if first == "" else self
         if first == "":
             first, *rest = rest

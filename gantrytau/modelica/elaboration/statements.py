@@ -285,7 +285,7 @@ def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
             if isinstance(found, ca.SX):
                 refuse_change(found)
             sampled = any(sample_calls(one))
-            yield Happening(found, actions, "sample" if sampled else "", sampled)
+            yield Happening(found, actions, "sample" if sampled else "", sampled, _failure(items, reader))
 
 
 def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
@@ -337,6 +337,13 @@ def _is_call(e: tree.Expression, name: str) -> bool:
     return isinstance(e, tree.Call) and e.function.parts[0][0] == name
 
 
+def _failure(items: Items, reader: Interpreter) -> str:
+    """The words of `assert(false, words)` in a branch of `when`; "" without one."""
+    calls = [one.call for one in items if isinstance(one, tree.ProcedureCall)]
+    ends = [one for one in calls if _is_call(one, "assert") and reader.value(one.arguments[0]) is False]
+    return reader.value(ends[0].arguments[1]) if ends else ""
+
+
 def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
     for item in items:
         if isinstance(item, tree.SimpleEquation):
@@ -351,7 +358,7 @@ def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
             yield reinit(values.to_casadi(variable), values.to_casadi(value))
         elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "terminate":
             yield terminate(reader.value(item.call.arguments[0]))
-        else:
+        elif not _failure([item], reader):
             reader.scope.refuse(
                 item.at, "found another statement in 'when', expected an equation, reinit or terminate"
             )

@@ -1,15 +1,16 @@
-"""The flat model as one Modelica class: declarations, initial equations, equations.
+"""The flat model in Base Modelica: declarations, initial equations, equations and whens of one model.
 
 Names are quoted identifiers, `'carts[0].s'`, so that every name of the model is one name there. What is known
-of the Dae is `input`. Derivatives of higher order get variables of their own, `'der(x)' = der('x')`; so do
+of the Dae is `input`. Derivatives of higher order get variables of their own, `'=der(x)' = der('x')`; so do
 propagated quantities and large subexpressions that occur more than once. The text has as many equations as
 unknowns, and none that follows from others: a constraint that would is replaced by `force = 0`. Modelica
-Language Specification 3.6, chapters 2, 3 and 8.
+Language Specification 3.6, chapters 2, 3 and 8; Modelica Change Proposal MCP-0031, Base Modelica.
 """
 
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.translated import Translated
@@ -17,22 +18,24 @@ from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import derivative_name, split_derivative
-from gantrytau.writing.graph import Graph, Node
-from gantrytau.writing.modelica_syntax import ModelicaSyntax, class_name, quoted, string
-from gantrytau.writing.subexpressions import Text, located, written, written_at
-from gantrytau.writing.syntax import CHOICE, Written, write
-from gantrytau.writing.text import event_lines
+from gantrytau.writing.graph import Graph, Node, expressions
+from gantrytau.writing.modelica_syntax import quoted, string
+from gantrytau.writing.subexpressions import Text, located, worth_a_name, written, written_at
+from gantrytau.writing.syntax import CHOICE, Written, ordered, write
+from gantrytau.writing.text import friction_lines
+from gantrytau.writing.when_equations import WhenEquations
 
 SELECT = {
     StateSelect.NEVER: "never", StateSelect.AVOID: "avoid",
     StateSelect.PREFER: "prefer", StateSelect.ALWAYS: "always",
 }  # fmt: skip
 NO_FORCE = "no force for "  # begins the name of the equation that stands for a redundant constraint
+MOVED = 1e-12  # share of a start value from which it has been moved, not rounded
 LEAST_SAVING = 40  # nodes; each name is one more unknown for the tool that reads the text
 
 
-def modelica_text(dae: Translated) -> str:
-    """The flat model as a Modelica class; ModelError for a function that Modelica does not have."""
+def base_modelica_text(dae: Translated) -> str:
+    """The flat model in Base Modelica; ModelError for a function that Modelica does not have."""
     return _Writer(dae).text()
 
 
@@ -60,13 +63,28 @@ class _Writer:
         self.auxiliaries: list[str] = []
         wanted = [n for name in dae.request.find for n in self.flat.expand(name) if n.startswith("der(")]
         self.wanted = [n for n in dict.fromkeys(wanted) if n not in self.flat.derivatives]
-        self.orders = self._orders()
-        self.syntax = ModelicaSyntax({n for n, order in self.orders.items() if order > 1})
+        on_instants = (*self.flat.sampled, *self.flat.whens, *self.flat.delays)
+        self.orders = self._orders([e for one in on_instants for _, e in one.sides])
+        self.whens = WhenEquations(self.flat, self.graph, LEAST_SAVING)
+        self.syntax = self.whens.syntax
+        self.starts = self._starts()
 
-    def _orders(self) -> dict[str, int]:
-        """The highest derivative of each variable that the text needs."""
+    def _starts(self) -> dict[str, ca.SX]:
+        """Start values that were moved, as they were found: who reads the text does not have to move them another way."""
+        started = [v for v in self.flat.variables if v.start is not None and not v.fixed]
+        names = [n for v in started for n in v.elements]
+        asked = [x for v in started for x in self.dae.table.numbers(ca.vertcat(*(v.start or ()))).tolist()]
+        found = self.dae.numbers(names, self.dae.start).tolist() if names else []
+        known = set(self.dae.known)
+        rows = zip(names, asked, found, strict=True)
+        return {
+            n: ca.SX(f) for n, a, f in rows if abs(f - a) > MOVED * max(abs(a), abs(f)) and n not in known
+        }
+
+    def _orders(self, used: list[ca.SX]) -> dict[str, int]:
+        """The highest derivative of each variable that the text needs; used: what it needs beside equations."""
         found: dict[str, int] = {}
-        used = [side for e in (*self.equations, *self.flat.initial_equations) for side in (e.left, e.right)]
+        used += [side for e in (*self.equations, *self.flat.initial_equations) for side in (e.left, e.right)]
         for leaf in ca.symvar(ca.SX(ca.vertcat(*used, *self.flat.definitions.values()))):
             name, order = split_derivative(leaf.name())
             found[name] = max(order, found.get(name, 0))
@@ -76,13 +94,15 @@ class _Writer:
 
     def text(self) -> str:
         sections = self._equations()  # first: they decide which variables there are
-        name = class_name(self.flat.name)
+        name = quoted(self.flat.name)
         lines = [f"model {name} {string('flat equations of ' + self.flat.name)}"]
         lines += [self._parameter(p, k) for p in self.flat.parameters for k in range(len(p.elements))]
         known = set(self.dae.known)
-        lines += [self._variable(v, k, known) for v in self.flat.variables for k in range(len(v.elements))]
-        lines += self.auxiliaries
-        return "\n".join([*lines, *sections, f"end {name};"]) + "\n"
+        places = [(v, k) for v in self.flat.variables for k in range(len(v.elements))]
+        lines += [self._variable(v, k, known) for v, k in places if v.elements[k] not in self.whens.spoken]
+        lines += [*self.auxiliaries, *self.whens.declared]
+        around = ["//! base 3.6.0", f"package {name}"]
+        return "\n".join([*around, *lines, *sections, f"end {name};", f"end {name};"]) + "\n"
 
     def _equations(self) -> list[str]:
         """The sections of equations; on the way, the declarations of auxiliary variables are collected."""
@@ -94,7 +114,9 @@ class _Writer:
             for name, node in propagated.items():
                 if not node.leaf:
                     named.setdefault(node, Written(quoted(name)))
-            text = written([*sides, *propagated.values()], self.syntax, named, saving=LEAST_SAVING)
+            roots = [*sides, *propagated.values()]
+            text = written(roots, self.syntax, named, saving=LEAST_SAVING)
+            self._start_shared(worth_a_name(roots, named, LEAST_SAVING))
         except ModelError:
             for equation in equations:  # one of them is at fault, and is named
                 written_at(equation.name, [equation.left, equation.right], self.syntax)
@@ -103,11 +125,25 @@ class _Writer:
         own, initial = lines[: len(self.equations)], lines[len(self.equations) :]
         found = ["initial equation", *initial] if initial else []
         found += ["equation", *own, *self._derivatives(), *self._named(propagated, text, len(sides))]
-        return [*found, *self._left_out()]
+        return [*found, *self.whens.lines(), *self._asserted(), *self._left_out()]
+
+    def _start_shared(self, nodes: list[Node]) -> None:
+        """Start values of shared subexpressions, without which an iteration may begin where they are not defined."""
+        made = expressions(ordered(nodes))
+        values = ca.SX(ca.vertcat(*(made[node] for node in nodes)))
+        leaves = ca.symvar(values)
+        names = [leaf.name() for leaf in leaves]
+        known = {**self.dae.table.values, "time": 0.0}
+        others = [n for n in names if n not in known]
+        known |= dict(zip(others, self.dae.numbers(others, self.dae.start) if others else (), strict=True))
+        found = ca.Function("starts", [ca.vertcat(*leaves)], [values])(ca.DM([known[n] for n in names]))
+        for number, value in enumerate(np.array(found).ravel(), start=1):
+            if np.isfinite(value):
+                self.starts[self.syntax.shared(number).text] = ca.SX(value)
 
     def _propagated(self) -> dict[str, Node]:
         nodes = self.graph.read(self.flat.definitions.values())
-        return dict(zip(self.flat.definitions, nodes, strict=True))
+        return dict(zip(self.flat.definitions, nodes, strict=True)) | self.whens.aside
 
     def _equation(self, equation: Equation, left: Written, right: Written) -> str:
         # an `if` may stand on the right only
@@ -121,11 +157,12 @@ class _Writer:
             for order in range(1, top):
                 new, old = derivative_name(name, order), derivative_name(name, order - 1)
                 words = "" if order == 1 else f"derivative {order} of {name}"
-                self.auxiliaries.append(f"  Real {quoted(new)} {string(words or f'derivative of {name}')};")
-                found.append(f"  {quoted(new)} = der({quoted(old)});")
+                variable = self.syntax.variable(new)
+                self.auxiliaries.append(f"  Real {variable} {string(words or f'derivative of {name}')};")
+                found.append(f"  {variable} = der({self.syntax.variable(old)});")
         for new in self.wanted:
-            self.auxiliaries.append(f"  output Real {quoted(f'wanted {new}')};")
-            found.append(f"  {quoted(f'wanted {new}')} = {self.syntax.symbol(new).text};")
+            self.auxiliaries.append(f"  output Real {quoted(f'=wanted {new}')};")
+            found.append(f"  {quoted(f'=wanted {new}')} = {self.syntax.symbol(new).text};")
         return found
 
     def _named(self, propagated: dict[str, Node], text: Text, start: int) -> list[str]:
@@ -141,13 +178,28 @@ class _Writer:
             elif name in declared:
                 self.auxiliaries.append(self._declare("", *declared[name]))
             else:
-                self.auxiliaries.append(f'  Real {name} "shared subexpression";')
+                guess = f"(start={self._expression(name, self.starts[name])})" if name in self.starts else ""
+                self.auxiliaries.append(f'  Real {name}{guess} "shared subexpression";')
         return [f"  {name} = {expression};" for name, expression in own.items() if name not in constant]
+
+    def _asserted(self) -> list[str]:
+        """What parameters must satisfy, and the ends of tables that are not defined beyond."""
+        found = [(ca.SX(one.condition), one.message) for one in self.flat.requirements]
+        found += [
+            (ca.logic_and(r.low <= r.expression, r.expression <= r.high), r.left) for r in self.flat.ranges
+        ]
+        conditions = [self.graph.truth(*self.graph.read([condition])) for condition, _ in found]
+        texts = write(conditions, self.syntax, {})
+        pairs = zip(conditions, found, strict=True)
+        return [f"  assert({texts[node].text}, {string(words)});" for node, (_, words) in pairs]
 
     def _left_out(self) -> list[str]:
         redundant = (*self.dae.redundant, *self.dae.reduced.redundant)
         left_out = [f"  // left out, it follows from the others: {e.name}" for e in redundant]
-        return [*left_out, *(f"  // an input here, in the model {line}" for line in event_lines(self.dae))]
+        return [
+            *left_out,
+            *(f"  // an input here, in the model {line}" for line in friction_lines(self.flat)),
+        ]
 
     def _parameter(self, parameter: FlatParameter, k: int) -> str:
         value = self._expression(parameter.elements[k], parameter.value[k])
@@ -156,9 +208,11 @@ class _Writer:
         )
 
     def _variable(self, variable: FlatVariable, k: int, known: set[str]) -> str:
-        if variable.elements[k] in known:
-            return self._declare("input ", variable, k)
-        return self._declare("output " if variable.kind == "output" else "", variable, k)
+        held = variable.elements[k] in self.whens.held
+        prefix = "output " if variable.kind == "output" else ""
+        if variable.elements[k] in known and not held:
+            prefix = "input "
+        return self._declare("discrete " + prefix if held else prefix, variable, k)
 
     def _declare(self, prefix: str, variable: FlatVariable, k: int, value: str = "", end: str = "") -> str:
         comment = f" {string(variable.description)}" if variable.description else ""
@@ -173,8 +227,9 @@ class _Writer:
             values = getattr(variable, key)
             if values is None or (values[k].is_constant() and abs(float(values[k])) == float("inf")):
                 continue
-            found.append(f"{key}={self._expression(f'{variable.elements[k]}, {key}', values[k])}")
-        if variable.fixed:
+            value = self.starts.get(variable.elements[k], values[k]) if key == "start" else values[k]
+            found.append(f"{key}={self._expression(f'{variable.elements[k]}, {key}', value)}")
+        if variable.fixed or variable.elements[k] in self.whens.held:
             found.append("fixed=true")
         if variable.prefer in SELECT:
             found.append(f"stateSelect=StateSelect.{SELECT[variable.prefer]}")
