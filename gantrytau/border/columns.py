@@ -55,7 +55,7 @@ class Columns:
             text = path.read_text(encoding="utf-8-sig")
             names, end, separator = _head(text)
             header = tuple(cell.strip() for _, row in _rows([names], separator) for cell in row)
-            text = "\n" * text.count("\n", 0, end) + text[end:]
+            text = text.replace(text[:end], "\n" * text.count("\n", 0, end), 1)
             lines, numbers = _plain(text, len(header), separator)
             if not numbers:
                 found = list(_rows(_stream(text), separator))

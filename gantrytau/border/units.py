@@ -81,7 +81,8 @@ class Scale:
         if self.zero:
             return (numbers + self.zero) * self.slope
         if self._plain:  # 700 mm are 700 / 1000 m, which 700 * 0.001 is not
-            return numbers * self.factor.numerator / self.factor.denominator
+            whole = numbers if self.factor.numerator == 1 else numbers * self.factor.numerator
+            return whole / self.factor.denominator
         return numbers * self.slope
 
     def written(self, values: Any) -> Any:

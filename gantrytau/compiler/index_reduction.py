@@ -80,6 +80,11 @@ class Indexed:
             self.exact,
         )
 
+    @cached_property
+    def with_initial(self) -> dict[tuple[str, ...], Level]:
+        """All equations and the initial ones as one level, by the inputs that may move; empty until it is asked for."""
+        return {}
+
     def unknown_symbols(self) -> list[str]:
         """Every unknown with all its derivatives up to the highest, by name."""
         return [derivative_name(n, k) for n, top in self.orders.items() for k in range(top + 1)]

@@ -38,7 +38,7 @@ class Trail:
         watched = watched or coordinates.curved
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
-        periods = np.array([table.number(s.period) for s in events])
+        periods = coordinates.kept("periods", lambda: np.array([table.number(s.period) for s in events]))
         found = instants(mesh, coordinates.held, periods)
         self.t, self.due = found.mesh, found.due
         self.driven = self._values(self.t)

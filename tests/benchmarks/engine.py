@@ -1,7 +1,6 @@
 """Figures of the compiler and the simulator, beside the closed form written by hand."""
 
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from gantrytau import simulate, translate
 from gantrytau_models import GantryTau, Pendulum, prototypes
 from tests.benchmarks import closed_form
-from tests.benchmarks.table import Row, at_most, in_turn, shown
+from tests.benchmarks.table import Row, at_most, in_turn, shown, started
 
 FORCES = [f"carts[{k}].f" for k in range(3)]
 
@@ -46,7 +45,7 @@ def rows() -> Iterator[Row]:
     times = in_turn({"translate": lambda: translate(robot)}, 7)
     yield at_most("translating the robot", times["translate"], 0.3, "s")
     yield from _pendulum()
-    yield _import_time()
+    yield from _starts()
 
 
 def _accuracy(hand: ca.Function, model: ca.Function) -> Iterator[Row]:
@@ -113,9 +112,17 @@ def _pendulum() -> Iterator[Row]:
     yield shown("pendulum, 100 s, translation included", f"{times['simulate']:.3f} s")
 
 
-def _import_time() -> Row:
-    def load(statement: str):
-        return lambda: subprocess.run([sys.executable, "-c", statement], check=True)
-
-    times = in_turn({"gantrytau": load("from gantrytau import *"), "nothing": load("import sys")}, 7)
-    return at_most("from gantrytau import *", times["gantrytau"] - times["nothing"], 0.4, "s")
+def _starts() -> Iterator[Row]:
+    """Processor time of what users start: an import, the help, and a command that translates and simulates."""
+    command = ("-m", "gantrytau.cli")
+    programs = {
+        "nothing": ("-c", ""),
+        "from gantrytau import *": ("-c", "from gantrytau import *"),
+        "gantrytau --help": (*command, "--help"),
+        "gantrytau simulate FourBar --stop 2": (*command, "simulate", "FourBar", "--stop", "2"),
+    }
+    times = started(programs, 5)
+    empty = times.pop("nothing")
+    yield at_most("from gantrytau import *", times.pop("from gantrytau import *") - empty, 0.4, "s")
+    for (title, seconds), limit in zip(times.items(), (0.35, 1.2), strict=True):
+        yield at_most(title, seconds, limit, "s")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -18,7 +19,7 @@ from tests.benchmarks.gta import Task
 from tests.benchmarks.peers import by_hand, three_link, with_opti
 from tests.benchmarks.peers.written import Outcome
 from tests.benchmarks.pose_sweep import fastest, pairs, prepared
-from tests.benchmarks.table import Row, at_most, print_table, shown
+from tests.benchmarks.table import Row, at_most, peak_memory, print_table, shown
 
 ELEMENTS = (25, 50, 100, 200, 400)
 PEER_TIME = 15.0  # s that a peer may take for all of them
@@ -125,13 +126,8 @@ def measure_large(max_time: float = LARGE_TIME) -> None:
     found = {
         name: getattr(outcome, name) for name in ("variables", "build", "solve", "iterations", "success")
     }
-    try:
-        import resource
-    except ImportError:  # Windows
-        pass
-    else:
-        unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss, in bytes
-        found["memory"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
+    with suppress(ImportError):  # Windows
+        found["memory"] = peak_memory()
     print(json.dumps(found))
 
 

@@ -1,9 +1,15 @@
 """Rows of the bench table."""
 
+import os
+import re
 import statistics
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -45,6 +51,36 @@ def in_turn(programs: dict[str, Callable[[], Any]], rounds: int) -> dict[str, fl
             program()
             times[name].append(time.perf_counter() - begin)
     return {name: statistics.median(found) for name, found in times.items()}
+
+
+def started(programs: dict[str, tuple[str, ...]], rounds: int) -> dict[str, float]:
+    """Median processor time in s of Python with each list of arguments, in turn, after a first run.
+
+    The first run keeps the modules as byte code: PYTHONDONTWRITEBYTECODE would have each run compile all sources.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        kept = {**os.environ, "PYTHONPYCACHEPREFIX": folder, "PYTHONDONTWRITEBYTECODE": ""}
+
+        def seconds(arguments: tuple[str, ...]) -> float:
+            before = os.times()
+            subprocess.run([sys.executable, *arguments], env=kept, stdout=subprocess.DEVNULL, check=True)
+            after = os.times()
+            return after.children_user + after.children_system - before.children_user - before.children_system
+
+        runs = [[seconds(one) for one in programs.values()] for _ in range(rounds + 1)][1:]
+    return {
+        name: statistics.median(found) for name, found in zip(programs, zip(*runs, strict=True), strict=True)
+    }
+
+
+def peak_memory() -> float:
+    """Peak memory of this process in GB; ru_maxrss of Linux begins with that of the parent process."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        return int(re.findall(r"VmHWM:\s*(\d+) kB", status.read_text())[0]) * 1024 / 1e9
+    import resource  # of macOS, in bytes; there is none on Windows
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e9
 
 
 WIDTH = 140  # of the table where the output is no terminal

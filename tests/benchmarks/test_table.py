@@ -1,6 +1,8 @@
 """Targets that are missed are told, whatever kind of number the figure is."""
 
 import importlib
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -40,3 +42,9 @@ def test_a_table_whose_targets_are_met_says_so(capsys):
 def test_every_part_of_the_table_can_be_imported():
     bench = importlib.import_module("tests.benchmarks.__main__")
     assert 0 < bench.LONGEST <= 20  # min
+
+
+def test_peak_memory_is_that_of_the_process_alone():
+    held = np.ones(40_000_000)  # 320 MB of the parent
+    code = "from tests.benchmarks.table import peak_memory; print(peak_memory())"
+    assert float(subprocess.check_output([sys.executable, "-c", code])) < held.nbytes / 2e9

@@ -45,22 +45,38 @@ def solve_levels(
         if level.residuals:
             free = [n for n in moving if n not in started]
             looser = [n for n in moving if n not in chosen]
-            try:  # starts that fit together are held, or else those that whoever uses the model chose
-                try:
-                    _solve(level, free, values, started, title)
-                except InitializationError:
-                    if not len(free) < len(looser) < len(moving):
-                        raise
-                    _solve(level, looser, values, started, title)
+            # starts that fit together are held, or else those that whoever uses the model chose
+            fewer = [free, looser] if len(free) < len(looser) < len(moving) else [free]
+            if any(_solved(level, names, values, started, title) for names in fewer):
+                continue
+            try:
+                (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
             except InitializationError:
-                try:
-                    (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
-                except InitializationError:
-                    if not _follows(level, moving, values, chosen) and not _solve_switching(
-                        level, moving, values, started, title
-                    ):
-                        raise
+                if not _follows(level, moving, values, chosen) and not _solve_switching(
+                    level, moving, values, started, title
+                ):
+                    raise
     return values
+
+
+def _solved(
+    level: Level, moving: Sequence[str], values: dict[str, float], started: frozenset[str], title: str
+) -> bool:
+    """Solve for some names, the other values being held; False where these do not fit together."""
+    place = level.place
+    rows, columns = level.entries
+    still = np.ones(len(level.residuals), dtype=bool)
+    still[rows[np.isin(columns, [place[n] for n in moving if n in place])]] = False
+    given = np.array([values[n] for n in level.leaves])
+    f, _ = level.look(given)
+    off = np.flatnonzero(still & (f != 0))  # equations without any of the names
+    if off.size and np.any(np.abs(f[off]) > SOLVED * level.sizes(off.tolist(), given)):
+        return False
+    try:
+        _solve(level, moving, values, started, title)
+    except InitializationError:
+        return False
+    return True
 
 
 def _follows(level: Level, moving: Sequence[str], values: dict[str, float], chosen: frozenset[str]) -> bool:

@@ -83,8 +83,11 @@ def _consistent_start(
         except InitializationError:
             raise error from None
     if flat.initial_equations and not held:
-        extra = _initial_level(flat, reduced, stages)
-        values = solve_levels([extra], values, held=fixed, started=guess.started, title=title)
+        if free not in indexed.with_initial:
+            indexed.with_initial[free] = _initial_level(flat, reduced, stages)
+        values = solve_levels(
+            [indexed.with_initial[free]], values, held=fixed, started=guess.started, title=title
+        )
     return values
 
 

@@ -1,8 +1,9 @@
 """Equations that are solved together, with their numbers, derivatives and the sizes of their terms."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -78,15 +79,21 @@ class Level:
 
     def sizes(self, rows: Sequence[int], numbers: np.ndarray) -> np.ndarray:
         """How large the terms of some residuals are, at numbers of the leaves."""
-        key = tuple(rows)
-        if key not in self._sizes:
-            x, _, _ = self.symbolic
+
+        def made() -> ca.Function:
             terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
-            self._sizes[key] = ca.Function("sizes", [x], [terms])
-        return called(self._sizes[key], numbers)[0]
+            return ca.Function("sizes", [self.symbolic[0]], [terms])
+
+        return called(self.kept(("sizes", *rows), made), numbers)[0]
+
+    def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What does not depend on numbers, made at its first use."""
+        if key not in self._made:
+            self._made[key] = make()
+        return self._made[key]
 
     @cached_property
-    def _sizes(self) -> dict[tuple[int, ...], ca.Function]:
+    def _made(self) -> dict[Hashable, Any]:
         return {}
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

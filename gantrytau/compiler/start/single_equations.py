@@ -18,14 +18,9 @@ def propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray
 
     point: numbers of the leaves; missing: places of those without a start.
     """
-    x, _, jacobian = level.symbolic
-    rows, columns = level.entries
-    inside = np.flatnonzero(np.isin(columns, list(missing)))
-    entries, leaves = jacobian.nonzeros(), x.elements()
-    moves = depending([entries[k] for k in inside], [leaves[j] for j in missing])
-    curved = np.zeros(len(level.residuals), dtype=bool)
-    curved[rows[inside][np.array(moves, dtype=bool)]] = True
-    rounds = list(_rounds(rows[inside].tolist(), columns[inside].tolist()))
+    inside = np.flatnonzero(np.isin(level.entries[1], list(missing)))
+    known, rounds = level.kept(("order", frozenset(missing)), lambda: _order(level, inside, missing))
+    curved = known.copy()
     straight = _Straight(level, point, inside)
     while True:
         found, used = point.copy(), np.zeros(len(curved), dtype=bool)
@@ -41,6 +36,19 @@ def propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray
         if not np.any(wrong):
             return found
         curved |= wrong
+
+
+def _order(
+    level: Level, inside: np.ndarray, missing: set[int]
+) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+    """Which equations are not linear in missing values, and the rounds in which they give these."""
+    x, _, jacobian = level.symbolic
+    rows, columns = (side[inside] for side in level.entries)
+    entries, leaves = jacobian.nonzeros(), x.elements()
+    moves = depending([entries[k] for k in inside], [leaves[j] for j in missing])
+    curved = np.zeros(len(level.residuals), dtype=bool)
+    curved[rows[np.array(moves, dtype=bool)]] = True
+    return curved, list(_rounds(rows.tolist(), columns.tolist()))
 
 
 class _Rows:
@@ -80,12 +88,16 @@ class _Straight:
 
 def _solve_curved(level: Level, found: np.ndarray, unknowns: np.ndarray, equations: np.ndarray) -> None:
     """Solve some equations for one unknown each and write these into the numbers, where an equation is linear in it."""
-    x, residual, jacobian = level.symbolic
     held, begin, own = _Rows(*level.entries, len(level.residuals)).of(equations, unknowns)
-    residuals, entries = residual.elements(), jacobian.nonzeros()
-    function = ca.Function(
-        "round", [x], [column([residuals[i] for i in equations]), column([entries[k] for k in held])]
-    )
+
+    def made() -> ca.Function:
+        x, residual, jacobian = level.symbolic
+        residuals, entries = residual.elements(), jacobian.nonzeros()
+        return ca.Function(
+            "round", [x], [column([residuals[i] for i in equations]), column([entries[k] for k in held])]
+        )
+
+    function = level.kept(("round", *equations.tolist()), made)
     f, slopes = called(function, found)
     given, old = _given(f, slopes, begin, own), found[unknowns]
     found[unknowns[given]] -= f[given] / slopes[own][given]

@@ -10,7 +10,7 @@ from gantrytau.kernels import Kernel
 from gantrytau.simulation.full_coordinates import Coordinates
 from gantrytau.simulation.sampling.sampling_interval import Passage, passage
 
-CALLS = (1, 8, 64, 512, 4096)  # passages in one call
+CALLS = (1, 8, 64, 512, 2048, 4096)  # passages in one call
 LONGEST_CALL = 40_000_000  # instructions: some tenths of a second, for which Ctrl-C has to wait
 WORTH = 10_000  # passages of a model: for so many it is compiled, which takes as long as these
 

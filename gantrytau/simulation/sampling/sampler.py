@@ -18,6 +18,7 @@ from gantrytau.simulation.time_grid import Trail
 
 MOST = 256  # steps from place to place: with more, an implicit method is quicker, though it starts anew
 FIRST = 8  # passages in a first call, and times more in the next
+FULL = 1.5  # times the passages that are wanted, a call may be of so many
 SAFETY = 0.9  # of the step that the last error suggests
 SHRINK, GROW = 0.2, 5.0  # of a step, at once
 TRIALS = 12  # of one step
@@ -127,7 +128,8 @@ class Sampler:
         ends = np.cumsum(parts)
         wanted = max(min(int(ends[-1]), self.most), int(parts[0]))
         calls = self.passages.calls
-        sizes = [k for k in calls if parts[0] <= k <= wanted] or [k for k in calls if k >= wanted][:1]
+        # what is left of a larger call stands still, and costs less than further calls
+        sizes = [k for k in calls if parts[0] <= k <= FULL * wanted] or [k for k in calls if k >= wanted][:1]
         if not sizes:
             return 0, False
         size = sizes[-1]
