@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
+from gantrytau.compiler.symbol_spaces import called
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.sweeps import INTEGRALS, PLACES
 from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
@@ -82,8 +83,13 @@ def _doubtful(trajectory: Trajectory) -> bool:
     signals = trajectory.at(element, place, times)
     unknowns = ca.vertcat(*(s.symbol for s in (*phase.states, *phase.algebraics)))
     equations = ca.densify(ca.vertcat(phase.ode, phase.residuals))
-    look = trajectory.function(ca.horzcat(equations, ca.jacobian(equations, unknowns)))
-    rows = np.array(look(times[None, :], signals)).reshape(n + m, times.size, -1).swapaxes(0, 1)
+    columns = ca.horzcat(equations, ca.jacobian(equations, unknowns))
+    look = trajectory.function(columns.nz[:]).map(times.size)
+    rows = np.zeros((times.size, n + m + 1, n + m))
+    (nonzeros,) = called(look, times, signals.T)
+    row, column = (np.array(part) for part in columns.sparsity().get_triplet())
+    rows[:, column, row] = nonzeros.reshape(times.size, -1)
+    rows = rows.swapaxes(1, 2)
     if not np.all(np.isfinite(rows)):
         return True
     try:  # the algebraics follow: dz = -g_z^-1 (g + g_x dx)
