@@ -208,8 +208,15 @@ class Solver:
             status=status,
             iterations=int(stats["iter_count"]),
             solve_time=0.0,
+            upright=_upright(stats),
         )
         return _ended(solution, watch, begin)
+
+
+def _upright(stats: Mapping[str, Any]) -> bool:
+    """Whether the last steps were made without regularisation; the first entry tells of no step."""
+    last = stats.get("iterations", {}).get("regularization_size", ())[1:][-LAST:]
+    return len(last) > 0 and not any(last)
 
 
 def _ended(solution: Solution, watch: Watch, begin: float) -> Solution:
