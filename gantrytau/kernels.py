@@ -70,6 +70,11 @@ class Kernel:
         self._next = 0.0 if size <= MOST else math.inf  # look into the cache, s
         self._key, self._folder, self._command = "", Path(), [""]
 
+    @property
+    def awaited(self) -> bool:
+        """Whether a kernel was looked for, was not there, and may be by now."""
+        return 0.0 < self._next < math.inf
+
     def called(self, calls: float, ahead: float = 0.0, *, begin: bool = True, wait: bool = False) -> bool:
         """Count calls; whether `function` has become the kernel by this.
 
@@ -118,14 +123,19 @@ def code_size(function: ca.Function) -> float:
     return own + sum(code_size(called) for called in function.find_functions(0))
 
 
-def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
-    """The function compiled, where that pays, or the function itself.
+def kernel_for(function: ca.Function, calls: float, wait: bool = False) -> Kernel:
+    """The kernel of a function where that pays, if it is there; else a process begins to compile it.
 
     calls: how often it is expected to be called; wait: whether to wait for a compiler instead of going on without.
     """
     own = Kernel(function, level="-O1" if calls > OFTEN else "-O0")
     own.called(0.0, calls, wait=wait)
-    return own.function
+    return own
+
+
+def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
+    """The function compiled, where that pays, or the function itself; arguments of `kernel_for`."""
+    return kernel_for(function, calls, wait).function
 
 
 def c_compiler() -> list[str] | None:

@@ -81,6 +81,8 @@ class Reduced:
 
     def to_reduced(self, expression: ca.SX) -> ca.SX:
         """An expression of the model's symbols in those of the reduced equations; others stay."""
+        if expression.is_constant():
+            return expression
         expression = self.definitions.to_reduced(self.table.to_reduced(expression))
         found = [(leaf, self.root(leaf.name())) for leaf in ca.symvar(expression)]
         old = [leaf for leaf, alias in found if alias is not None]
@@ -302,11 +304,23 @@ class _Elimination:
                 stack.append((node.dep(0), factor * float(node.dep(1))))
             elif operator == ca.OP_DIV and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor / float(node.dep(1))))
-            elif all(leaf.name() in self.parameters for leaf in ca.symvar(node)):
+            elif self._steady_alone(node):
                 terms.shift(factor, node)
             else:
                 return None
         return None
+
+    def _steady_alone(self, node: ca.SX) -> bool:
+        """Whether an expression is one of parameters alone; of most others the first few symbols tell."""
+        stack = [node]
+        for _ in range(LONGEST_SUM):
+            if not stack:
+                return True
+            one = stack.pop()
+            if one.is_symbolic() and one.name() not in self.parameters:
+                return False
+            stack += [one.dep(k) for k in range(one.n_dep())]
+        return all(leaf.name() in self.parameters for leaf in ca.symvar(node))
 
     def _rooted(self, terms: _Terms) -> _Terms:
         """The same sum in roots and their derivatives."""

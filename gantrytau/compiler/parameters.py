@@ -8,7 +8,7 @@ import numpy as np
 
 from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.border.units import given
-from gantrytau.compiler.symbol_spaces import values_at
+from gantrytau.compiler.symbol_spaces import column, values_at
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 from gantrytau.flattening.shapes import elements_of
 
@@ -28,10 +28,12 @@ class ParameterTable:
 
     def to_reduced(self, expression: ca.SX) -> ca.SX:
         """The expression with dependent and folded parameters replaced."""
-        if not self.expressions or expression.numel() == 0:
+        names = [leaf.name() for leaf in ca.symvar(expression)] if self.expressions else []
+        dependent = [name for name in names if name in self.expressions]
+        if not dependent:
             return expression
-        old = ca.vertcat(*(self.symbols[name] for name in self.expressions))
-        return ca.substitute(expression, old, ca.vertcat(*self.expressions.values()))
+        old, new = (column([of[name] for name in dependent]) for of in (self.symbols, self.expressions))
+        return ca.substitute(expression, old, new)
 
     def numbers(self, expression: ca.SX) -> np.ndarray:
         """The values of expressions of parameters, (n,)."""
@@ -113,7 +115,9 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
     independent: list[str] = []
     for name in order:
         binding = bindings[name]
-        if needs[name]:
+        if binding.is_symbolic():
+            values[name] = values[needs[name][0]]
+        elif needs[name]:
             inside = ca.vertcat(*(symbols[n] for n in needs[name]))
             values[name] = float(
                 ca.evalf(ca.substitute(binding, inside, ca.DM([values[n] for n in needs[name]])))
@@ -126,8 +130,11 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
             expressions[name] = ca.SX(values[name])
         elif needs[name] and name not in keep:
             inner = [n for n in needs[name] if n in expressions]
-            old, new = (ca.vertcat(*(of[n] for n in inner)) for of in (symbols, expressions))
-            expressions[name] = ca.substitute(binding, old, new) if inner else binding
+            if inner and binding.is_symbolic():
+                expressions[name] = expressions[inner[0]]
+            else:
+                old, new = (column([of[n] for n in inner]) for of in (symbols, expressions))
+                expressions[name] = ca.substitute(binding, old, new) if inner else binding
         else:
             independent.append(name)
     _check_limits(flat, values)

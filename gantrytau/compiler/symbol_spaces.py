@@ -12,7 +12,7 @@ root behind it), `System.to_system` from the second to the third. What is solved
 `Substitution`, whatever the last symbols are.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -65,6 +65,14 @@ class Substitution:
 def column(elements: Sequence[ca.SX]) -> ca.SX:
     """Scalars and columns below each other; (0, 1) for none."""
     return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+
+def together(change: Callable[[ca.SX], ca.SX], expressions: Sequence[ca.SX]) -> list[ca.SX]:
+    """Dense expressions changed as one column, so that what they have in common is gone through once."""
+    dense = [e if e.is_dense() else ca.densify(e) for e in expressions]
+    found = change(column([e if e.is_column() else ca.vec(e) for e in dense]))
+    pieces = ca.vertsplit(found, np.cumsum([0, *(e.numel() for e in dense)]).tolist())
+    return [x if e.is_column() else ca.reshape(x, *e.shape) for x, e in zip(pieces, dense, strict=True)]
 
 
 def called(function: ca.Function, *arguments: np.ndarray) -> list[np.ndarray]:

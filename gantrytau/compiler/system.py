@@ -6,13 +6,12 @@ from functools import partial
 from typing import Literal
 
 import casadi as ca
-import numpy as np
 
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.compiler.blocks.inverse_form import Inverse, SortedEquations, inverse_of, torn_of
 from gantrytau.compiler.blocks.pivots import Guide
 from gantrytau.compiler.blocks.solution import Block
-from gantrytau.compiler.symbol_spaces import Substitution, column
+from gantrytau.compiler.symbol_spaces import Substitution, column, together
 from gantrytau.compiler.translated import Origin, Translated, origin_of
 
 Causality = Literal["inverse", "forward"]
@@ -74,10 +73,7 @@ class System:
 
     def to_system(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
         """Expressions in reduced symbols as expressions of (time, x, z, u, p) and derivatives of inputs."""
-        dense = [ca.densify(e) for e in expressions]
-        (found,) = Substitution(self.definitions).inserted([column([ca.vec(e) for e in dense])])
-        pieces = ca.vertsplit(found, np.cumsum([0, *(e.numel() for e in dense)]).tolist())
-        return [ca.reshape(piece, *e.shape) for piece, e in zip(pieces, dense, strict=True)]
+        return together(lambda whole: Substitution(self.definitions).inserted([whole])[0], expressions)
 
 
 def assemble(

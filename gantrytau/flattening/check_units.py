@@ -131,11 +131,12 @@ def _terms(
     symbols: Sequence[ca.SX], known: Sequence[Dimensioned], expressions: Sequence[ca.SX]
 ) -> list[Dimensioned]:
     """Scalar expressions with their units, in symbols of which they are known."""
-    function = ca.Function("units", symbols, expressions, {"cse": False, "allow_free": False})
-    found = computed(
-        function, lambda k, _: known[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
+    arguments, results = ([ca.densify(ca.vertcat(ca.SX(0, 1), *of))] for of in (symbols, expressions))
+    function = ca.Function("units", arguments, results, {"cse": False, "allow_free": False})
+    (found,) = computed(
+        function, lambda _, k: known[k], lambda x: Dimensioned(NUMBER if x else ANY, f"{x:g}"), _operation
     )
-    return [one[0] if one else Dimensioned(ANY, "0") for one in found]
+    return found
 
 
 def _operation(operator: int, operands: Sequence[Dimensioned]) -> Dimensioned:

@@ -9,7 +9,6 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.language.instructions import refuse_calls
-from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
@@ -39,11 +38,11 @@ def refuse_tables(equations: Iterable[Equation]) -> None:
 def first_with(
     equations: Sequence[Equation], names: Iterable[str], wrong: Callable[[str], bool]
 ) -> tuple[Equation, str] | None:
-    """The first equation with a symbol of a wrong name, and that name; names: of all symbols in the equations."""
+    """The first equation with a symbol of a wrong name, and that name; names: of all symbols in these equations or more."""
     if not any(map(wrong, names)):
         return None
     leaves = ((equation, leaf.name()) for equation in equations for leaf in ca.symvar(equation.residual))
-    return next((equation, name) for equation, name in leaves if wrong(name))
+    return next(((equation, name) for equation, name in leaves if wrong(name)), None)
 
 
 def refuse_absent(equations: Sequence[Equation], names: Iterable[str], absent: Mapping[str, str]) -> None:
@@ -68,9 +67,8 @@ def refuse_starts(instance: Instance, absent: Mapping[str, str]) -> None:
             )
 
 
-def refuse_before(equations: Sequence[Equation]) -> None:
-    """ModelError for a value just before an instant where there is none."""
-    names = leaf_names(e.residual for e in equations)
+def refuse_before(equations: Sequence[Equation], names: Iterable[str]) -> None:
+    """ModelError for a value just before an instant where there is none; names: of all symbols in the equations or more."""
     if found := first_with(equations, names, lambda n: n.startswith("pre(")):
         raise ModelError(
             f"{found[0].name}: found {found[1]}, expected it in when(...) only: an equation holds at all times, "

@@ -3,8 +3,9 @@
 import inspect
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -29,8 +30,7 @@ ATTRIBUTES = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class Leaf:
+class Leaf(NamedTuple):
     """A modification and the instance in which its formulas are to be read.
 
     more: modifications of a component that replaces another, from further out.
@@ -38,7 +38,7 @@ class Leaf:
 
     value: Any
     scope: Any
-    more: Mapping[Any, Any] = field(default_factory=dict)
+    more: Mapping[Any, Any] = MappingProxyType({})
 
 
 @dataclass(eq=False)
@@ -186,8 +186,8 @@ class _Growing(Instance):
                 f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
                 f"model; expected another name, as {full}_left"
             )
-        declared = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
-        attributes = {key: Leaf(value, instance) for key, value in declared.items() if value is not None}
+        declared = ((key, getattr(declaration, key, None)) for key in ATTRIBUTES)
+        attributes = {key: Leaf(value, instance) for key, value in declared if value is not None}
         if (
             isinstance(modification, Leaf)
             and isinstance(modification.value, Quantity)
@@ -215,20 +215,23 @@ class _Growing(Instance):
         shape = _shape(declaration, attributes, instance, full)
         names = element_names(full, shape, instance.first_index)
         kind = declaration.kind
-        vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
-        symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
+        scalars = [self.symbols.add(element, kind).sx for element in names]
+        symbol = ca.vertcat(*scalars) if len(scalars) > 1 else scalars[0]
+        if len(shape) == 2:
+            symbol = ca.reshape(symbol, *shape)
         instance.__dict__[name] = symbol
         if isinstance(declaration, Mode):
             if "start" in attributes:
                 start = attributes["start"]
-                attributes["start"] = replace(start, value=mode_number(full, declaration.names, start.value))
+                number = mode_number(full, declaration.names, start.value)
+                attributes["start"] = start._replace(value=number)
             if "value" in attributes:
                 raise ModelError(
                     f"{full}: found the value {attributes['value'].value!r} for a Mode, which transitions change, expected "
                     f"a start; write {name}=Start('{declaration.names[-1]}')"
                 )
             instance.__dict__[name] = CurrentMode(symbol, declaration.names, full)
-        chosen = full in self.chosen or re.sub(r"\[\d+\]", "", full) in self.chosen
+        chosen = bool(self.chosen) and bool({full, re.sub(r"\[\d+\]", "", full)} & self.chosen)
         self.quantities.append(Placed(path, full, declaration, shape, symbol, attributes, names, chosen))
 
     def resolve_outers(self) -> None:
@@ -329,7 +332,7 @@ def _merge(below: Mapping[Any, Any], above: Mapping[Any, Any]) -> dict[Any, Any]
         elif isinstance(merged.get(key), dict) and isinstance(value, dict):
             merged[key] = _merge(merged[key], value)
         elif _replaces(merged.get(key)) and isinstance(value, dict):
-            merged[key] = replace(merged[key], more=_merge(merged[key].more, value))
+            merged[key] = merged[key]._replace(more=_merge(merged[key].more, value))
         else:
             merged[key] = value
     return merged

@@ -166,6 +166,8 @@ def with_sides(statements: Sequence[Statement], written: Iterator[Equation]) -> 
 
 def with_starts(variables: Sequence[FlatVariable], events: Events) -> tuple[FlatVariable, ...]:
     """Variables with the start values that samplings give; ModelError where they have another already."""
+    if not events.starts:
+        return tuple(variables)
     found = []
     for variable in variables:
         given = [n for n in variable.elements if n in events.starts]

@@ -64,7 +64,8 @@ def joined(value: Any) -> ca.SX:
             value = ca.vertcat(*(ca.horzcat(*row) for row in value)) if rows else ca.vertcat(*value)
         else:
             value = ca.DM(np.asarray(value, dtype=float))
-    return ca.densify(ca.SX(value))
+    found = value if isinstance(value, ca.SX) else ca.SX(value)
+    return found if found.is_dense() else ca.densify(found)
 
 
 def numpy_shape(expression: ca.SX) -> Shape:

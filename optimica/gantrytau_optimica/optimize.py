@@ -29,6 +29,7 @@ from gantrytau_optimica.refinement.refinement import with_ramps
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.solving.ipopt import Solver
 from gantrytau_optimica.transcription.mesh import with_jumps
+from gantrytau_optimica.transcription.program import Program
 from gantrytau_optimica.transcription.transcribe import Scheme, transcribe
 
 Problem = Optimization | type[Optimization] | SymbolicProblem
@@ -135,6 +136,28 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
         policy = replace(
             policy, elements=1, points=1, scheme="radau", lengths="given", controls=None, refine=None
         )
+    built, program = _kept_program(built, policy)
+    solver = Solver(program, replace(policy.solver, loops=bool(built.system.loops)))
+    return Prepared(
+        built, program, solver, guess, time.perf_counter() - begin, policy.refine, policy.starts, near
+    )
+
+
+def _kept_program(built: Built, policy: Policy) -> tuple[Built, Program]:
+    """What is transcribed, and its program: those of the last call where this one is about the same."""
+    made, mesh = built.read.dae.made, policy.mesh
+    how = policy.scheme, policy.points, policy.compile, policy.refine is None
+    wanted = built, mesh.borders.tobytes(), mesh.moving, *how
+    before, *found = made.get("program", ((),))
+    if before != wanted or found[1].assembled.awaited:
+        found = _transcribed(built, policy)
+        if any(built is one for one in made.values()):
+            made["program"] = wanted, *found
+    return found[0], found[1]
+
+
+def _transcribed(built: Built, policy: Policy) -> tuple[Built, Program]:
+    """The problem with inputs as they are transcribed, and its program."""
     meshes = [with_jumps(policy.mesh, phase) for phase in built.problem.phases]
     if policy.refine is not None or (policy.mesh.moving and policy.points > 1):
         # free borders would be moved to where limits are passed
@@ -143,10 +166,7 @@ def prepare_with(problem: Problem, parameters: Sequence[str], policy: Policy) ->
         built = replace(built, problem=with_ramped_rates(built.problem))
     program = transcribe(built.problem, policy.transcription.divided(meshes), policy.transcription)
     check_freedom(program)
-    solver = Solver(program, replace(policy.solver, loops=bool(built.system.loops)))
-    return Prepared(
-        built, program, solver, guess, time.perf_counter() - begin, policy.refine, policy.starts, near
-    )
+    return built, program
 
 
 def _built(read: SymbolicProblem, guess: Mapping[str, Any], held: Sequence[str], policy: Policy) -> Built:

@@ -157,9 +157,9 @@ def _inverse(every: SortedEquations, members: frozenset[int], guide: Guide) -> I
 
 def _singular(block: Block, guide: Guide) -> bool:
     """Whether equations of a linear block depend on each other at the start, rows and columns by their sizes."""
-    if not block.tears:
+    if block.slopes is None:
         return False
-    matrix = guide.at_start(ca.jacobian(ca.vertcat(*block.residuals), ca.vertcat(*block.tears)))
+    matrix = guide.at_start(block.slopes)
     if not np.all(np.isfinite(matrix)):
         return True
     for axis in (1, 0, 1):

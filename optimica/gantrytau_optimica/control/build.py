@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from gantrytau import Dae, ModelError
+from gantrytau.compiler.symbol_spaces import together
 from gantrytau.compiler.system import Causality, System
 from gantrytau.flattening.flat_model import FlatVariable
 from gantrytau.language.symbols import time
@@ -59,17 +61,23 @@ def build(
     constraints = (*read.constraints, *(c for _, more in conditions for c in more))
     limits = (*constraints, *_declared_limits(dae))
 
-    def resolve(expressions: Sequence[ca.SX]) -> list[ca.SX]:
-        return with_values(system.to_system([dae.to_reduced(ca.SX(e)) for e in expressions]), read, numbers)
-
-    rows = resolve([e for c in limits for e in (c.expression, c.lower, c.upper)])
-    values = resolve([p.expression for p in points])
-    times = [p.time if isinstance(p.time, str) else resolve([p.time])[0] for p in points]
-    objective, *targets = resolve([read.objective, *(t.expression for t in read.targets)])
+    said = (
+        [e for c in limits for e in (c.expression, c.lower, c.upper)],
+        [p.expression for p in points],
+        [p.time for p in points if not isinstance(p.time, str)],
+        [read.objective, *(t.expression for t in read.targets)],
+        [e for stage in read.phases for e in (stage.integrand, stage.start_time, stage.final_time)],
+    )
+    reduced = together(dae.to_reduced, [ca.SX(e) for part in said for e in part])
+    resolved = iter(with_values(system.to_system(reduced), read, numbers))
+    rows, values, moments, (objective, *targets), stages = (
+        list(islice(resolved, len(part))) for part in said
+    )
+    moving = iter(moments)
+    times = [p.time if isinstance(p.time, str) else next(moving) for p in points]
     split = _split(read, system, numbers, dict(controls or {}), rates)
     phases = []
-    for k, stage in enumerate(read.phases):
-        integrand, start_time, final_time = resolve([stage.integrand, stage.start_time, stage.final_time])
+    for k, (integrand, start_time, final_time) in enumerate(zip(*[iter(stages)] * 3, strict=True)):
         mine = [i for i, p in enumerate(points) if read.phase_of(p.expression, f"`{p.symbol}`") == k]
         phase = replace(
             split.phase(k),
@@ -118,7 +126,7 @@ def _statements(read: SymbolicProblem) -> list[ca.SX]:
     found = [read.objective, *(phase.integrand for phase in read.phases)]
     found += [e for c in read.constraints for e in (c.expression, c.lower, c.upper)]
     found += [one.expression for one in (*read.points, *read.targets)]
-    return [read.dae.to_reduced(ca.SX(e)) for e in found]
+    return together(read.dae.to_reduced, [ca.SX(e) for e in found])
 
 
 def _check_courses(read: SymbolicProblem, number: int, phase: Phase) -> None:

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase
+from gantrytau.compiler.symbol_spaces import called
+from gantrytau_optimica.control.control_problem import ControlProblem, Limit, Phase, PointValue
 from gantrytau_optimica.control.first_guesses.guesses import horizon
 from gantrytau_optimica.control.limits import signal_limits
 
@@ -255,7 +256,7 @@ def _along(
     function = ca.Function(
         "balance",
         [problem.time, signals, courses, problem.numbers],
-        [ca.densify(ca.vertcat(rows, *derivatives.nonzeros()))],
+        [ca.densify(ca.vertcat(rows, ca.vec(derivatives.nz[:])))],
     )
     guesses = np.array([s.guess(shares) for s in phase.signals]).reshape(-1, shares.size)
     known = np.array([c.value(times) for c in phase.courses]).reshape(-1, shares.size)
@@ -278,8 +279,8 @@ def _along(
 def _columns(function: ca.Function, times: np.ndarray, *rest: np.ndarray) -> np.ndarray:
     """A function at all times, one column each; what is not finite is zero."""
     signals, known, numbers = rest
-    found = [function(t, *each, numbers) for t, *each in zip(times, signals.T, known.T, strict=True)]
-    return _finite(np.hstack([np.array(x) for x in found]))
+    (found,) = called(function.map(times.size), times, signals.T, known.T, np.tile(numbers, times.size))
+    return _finite(found.reshape(times.size, -1).T)
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
@@ -309,10 +310,14 @@ def _points(problem: ControlProblem) -> _Points:
     symbols, values = [ca.SX(0, 1)], [np.zeros(0)]
     jacobian = [np.zeros((0, len(problem.signals) + len(problem.free)))]
     for phase, first in zip(problem.phases, _firsts(problem), strict=True):
+        points: dict[float, list[PointValue]] = {}
         for point in phase.points:
             share = float(point.time == "final") if isinstance(point.time, str) else 0.5
-            value, derivatives = _along(problem, phase, point.expression, np.array([share]))
-            symbols.append(point.symbol)
+            points.setdefault(share, []).append(point)
+        for share, here in points.items():
+            together = ca.vertcat(*(point.expression for point in here))
+            value, derivatives = _along(problem, phase, together, np.array([share]))
+            symbols += [point.symbol for point in here]
             values.append(value)
             jacobian.append(_placed(problem, phase, first, derivatives))
     return _Points(ca.vertcat(*symbols), np.concatenate(values), np.vstack(jacobian))

@@ -60,10 +60,12 @@ class _WithoutExpressions(Pickler):
         self.expressions: list[ca.SX] = []
 
     def reducer_override(self, obj: Any) -> Any:
-        """An expression as the number that it has here."""
+        """A constant as its value, another expression as the number that it has here."""
+        if isinstance(obj, ca.SX):
+            if obj.is_scalar() and obj.is_constant() and obj.nnz():
+                return float, (float(obj),)
+            self.expressions.append(obj)
+            return int, (len(self.expressions),)
         if callable(obj) and not isinstance(obj, type):
             raise PicklingError("a function may say something else next time")
-        if not isinstance(obj, ca.SX):
-            return NotImplemented
-        self.expressions.append(obj)
-        return int, (len(self.expressions),)
+        return NotImplemented

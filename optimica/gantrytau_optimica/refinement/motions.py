@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
 
+from gantrytau.compiler.symbol_spaces import called
 from gantrytau_optimica.answers.optimum import Optimum
 from gantrytau_optimica.answers.playback.sweeps import INTEGRALS, PLACES
 from gantrytau_optimica.refinement.refinement import kept_pieces, with_pieces
@@ -22,6 +22,9 @@ from gantrytau_optimica.transcription.transcribe import transcribed_again
 
 DOUBLED = 3  # times that elements are halved
 DOUBTFUL = 0.1  # of its size: first-order estimate of a state's deviation from which inputs are played back
+TERMS = 14  # of the series of an exponential: with sums of rows up to a half the rest is rounding
+TINY = 1e-300
+MOST_HALVINGS = 1100  # of the largest double
 RESOLVED = 1e-6  # of its size: misses of a state in an element, below which a plant that runs away is no fault of the mesh
 
 
@@ -82,8 +85,13 @@ def _doubtful(trajectory: Trajectory) -> bool:
     signals = trajectory.at(element, place, times)
     unknowns = ca.vertcat(*(s.symbol for s in (*phase.states, *phase.algebraics)))
     equations = ca.densify(ca.vertcat(phase.ode, phase.residuals))
-    look = trajectory.function(ca.horzcat(equations, ca.jacobian(equations, unknowns)))
-    rows = np.array(look(times[None, :], signals)).reshape(n + m, times.size, -1).swapaxes(0, 1)
+    columns = ca.horzcat(equations, ca.jacobian(equations, unknowns))
+    look = trajectory.function(columns.nz[:]).map(times.size)
+    rows = np.zeros((times.size, n + m + 1, n + m))
+    (nonzeros,) = called(look, times, signals.T)
+    row, column = (np.array(part) for part in columns.sparsity().get_triplet())
+    rows[:, column, row] = nonzeros.reshape(times.size, -1)
+    rows = rows.swapaxes(1, 2)
     if not np.all(np.isfinite(rows)):
         return True
     try:  # the algebraics follow: dz = -g_z^-1 (g + g_x dx)
@@ -97,16 +105,32 @@ def _doubtful(trajectory: Trajectory) -> bool:
     x = signals[:n].reshape(n, mesh.elements, PLACES.size).transpose(1, 2, 0)
     rests = x[:, :1] + INTEGRALS @ rows[..., 0] * spans - x
     grown = np.einsum(
-        "epij,epj,p->ei", expm(jacobian[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
+        "epij,epj,p->ei", exponentials(jacobian[:, None] * (1 - PLACES[:, None, None])), rests, INTEGRALS[-1]
     )
     misses = rests[:, -1] + np.einsum("eij,ej->ei", jacobian, grown)
     sizes = np.array([s.nominal for s in phase.states])
     if np.all(np.abs(misses) <= RESOLVED * sizes):
         return False
     off = np.zeros(n)
-    for growth, miss in zip(expm(jacobian), misses, strict=True):
+    for growth, miss in zip(exponentials(jacobian), misses, strict=True):
         off = growth @ off + miss
     return not np.all(np.abs(off) <= DOUBTFUL * sizes)
+
+
+def exponentials(matrices: np.ndarray) -> np.ndarray:
+    """Exponentials of many small matrices (..., n, n), by series of their parts and squares of these."""
+    size = np.abs(matrices).sum(axis=-1).max(axis=-1, initial=0.0)
+    halvings = np.clip(np.ceil(np.log2(np.maximum(size, TINY))) + 1, 0, MOST_HALVINGS).astype(int)
+    parts = matrices / np.exp2(halvings)[..., None, None]
+    found = term = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
+    for k in range(1, TERMS):
+        term = term @ parts / k
+        found = found + term
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k in range(halvings.max(initial=0)):
+            more = halvings > k
+            found[more] = found[more] @ found[more]
+    return found
 
 
 def _doubled(found: Optimum) -> Program:

@@ -281,7 +281,7 @@ class Solves:
         """A solution, or that to which it leads where the objective falls to a side."""
         for _ in range(MOST_LEFT):
             beside = list(places_aside(found.program, found.solution)) if found.success else []
-            better = next(self._better(found, solver, beside), None)
+            better = next(self._better(found, solver, beside), None) if beside else None
             if better is None:
                 if beside:
                     found = replace(found, solution=replace(found.solution, status=NO_MINIMUM))

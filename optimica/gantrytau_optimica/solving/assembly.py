@@ -53,10 +53,12 @@ def jumps(built: Built, trajectory: Trajectory) -> str:
     if not loops or times.size < 2:
         return ""
     positions = trajectory.values(ca.vertcat(*(s.symbol for s in loops)), times)
+    least = LEAST_JUMP * np.maximum(np.max(np.abs(positions), axis=1, keepdims=True), 1.0)
+    excess = np.abs(np.diff(positions)) - least
+    if not np.any(excess > 0):
+        return ""
     rates = np.abs(trajectory.values(built.expressed([f"der({s.symbol.name()})" for s in loops]), times))
-    way = FASTER * np.maximum(rates[:, 1:], rates[:, :-1]) * np.diff(times)
-    moved = np.abs(np.diff(positions)) - way
-    excess = moved - LEAST_JUMP * np.maximum(np.max(np.abs(positions), axis=1, keepdims=True), 1.0)
+    excess -= FASTER * np.maximum(rates[:, 1:], rates[:, :-1]) * np.diff(times)
     k, at = np.unravel_index(np.argmax(excess), excess.shape)
     if not excess[k, at] > 0:
         return ""

@@ -11,7 +11,7 @@ import numpy as np
 from gantrytau.describing.record import Record
 from gantrytau_optimica.solving.clock import Clock, Progress
 from gantrytau_optimica.solving.interruptible import Watch, attended
-from gantrytau_optimica.transcription.program import Program, first_guess
+from gantrytau_optimica.transcription.program import Program
 
 WORDS = {
     "Solve_Succeeded": "solved",
@@ -66,7 +66,6 @@ SLOPE = 1.0  # what the objective changes by when all unknowns change by their s
 STEEP = 1e2  # derivatives by one unknown are scaled down to this
 FEW = 1e2  # times an objective of few unknowns is scaled up
 ALONE = 3.0  # unknowns that share its gradient: fewer are few
-FLAT = 1e-6  # of the gradient beside the guess: that at the guess vanishes by accident
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,8 +208,15 @@ class Solver:
             status=status,
             iterations=int(stats["iter_count"]),
             solve_time=0.0,
+            upright=_upright(stats),
         )
         return _ended(solution, watch, begin)
+
+
+def _upright(stats: Mapping[str, Any]) -> bool:
+    """Whether the last steps were made without regularisation; the first entry tells of no step."""
+    last = stats.get("iterations", {}).get("regularization_size", ())[1:][-LAST:]
+    return len(last) > 0 and not any(last)
 
 
 def _ended(solution: Solution, watch: Watch, begin: float) -> Solution:
@@ -243,18 +249,7 @@ def objective_size(program: Program) -> float:
     """By how much the objective changes when all unknowns change by their sizes from the guess, to first order;
     from beside the guess, where its gradient vanishes there.
     """
-    return float(np.sum(_objective_gradient(program)[1]))
-
-
-def _objective_gradient(program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Finite derivatives of the objective by scaled unknowns at the guess, and those that tell its size."""
-    x = first_guess(program) / program.places.scale
-    beside = np.clip(x + 0.5 * np.sin(1.0 + 7.3 * np.arange(x.size)), program.lbw, program.ubw)
-    at_guess, near = (
-        np.abs(found[np.isfinite(found)])
-        for found in (np.array(program.assembled.grad_f(w, ca.DM(0, 1))[1]).ravel() for w in (x, beside))
-    )
-    return at_guess, at_guess if np.sum(at_guess) > FLAT * np.sum(near) else near
+    return float(np.sum(program.objective_gradient[1]))
 
 
 def _objective_scale(program: Program, few: float) -> float:
@@ -264,7 +259,7 @@ def _objective_scale(program: Program, few: float) -> float:
     are worth is its derivative, each of them so little that the barrier vanishes long before those that bind are found.
     Ipopt by itself scales down what is steep at the guess, by no more than 1e8.
     """
-    at_guess, gradient = _objective_gradient(program)
+    at_guess, gradient = program.objective_gradient
     size, steepest = float(np.sum(gradient)), float(np.max(gradient, initial=0.0))
     if size <= 0.0:
         return 1.0

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from gantrytau.kernels import kernel
+from gantrytau.kernels import Kernel, kernel_for
 
 EVALUATIONS = 100  # of the functions of a program, that a solve is expected to take
 
@@ -57,9 +57,9 @@ class Term:
         p: ca.MX,
         weights: ca.SX | None = None,
         weight_values: ca.MX | None = None,
-        compiled: bool = False,
+        kernels: list[Kernel] | None = None,
     ) -> ca.MX:
-        """All copies of an expression of the local variables, stacked into one column."""
+        """All copies of an expression of the local variables, stacked into one column; kernels: where one is to be noted."""
         symbols = [self.local, self.parameters, self.constants]
         local = ca.reshape(ca.mtimes(to_dm(self.gather), w), self.local.numel(), self.copies)
         arguments = [local, ca.repmat(p, 1, self.copies), ca.MX(ca.DM(self.constant_values))]
@@ -67,8 +67,9 @@ class Term:
             symbols.append(weights)
             arguments.append(ca.reshape(weight_values, weights.numel(), self.copies))
         function = ca.Function(name, symbols, [result])
-        if compiled:
-            function = kernel(function, calls=EVALUATIONS * self.copies)
+        if kernels is not None:
+            kernels.append(kernel_for(function, calls=EVALUATIONS * self.copies))
+            function = kernels[-1].function
         return ca.vec(function.map(self.copies)(*arguments))
 
 
@@ -97,6 +98,16 @@ class Assembled:
     def rows(self) -> int:
         """Their number."""
         return self.linear.shape[0]
+
+    @cached_property
+    def _kernels(self) -> list[Kernel] | None:
+        """Of its functions; None if there are to be none."""
+        return [] if self.compiled else None
+
+    @property
+    def awaited(self) -> bool:
+        """Whether kernels may be there by now that its functions do not use."""
+        return any(kernel.awaited for kernel in self._kernels or ())
 
     @cached_property
     def _symbols(self) -> tuple[ca.MX, ca.MX]:
@@ -146,7 +157,7 @@ class Assembled:
             small = ca.jacobian(term.values, term.local)
             if small.nnz() == 0:
                 continue
-            nonzeros.append(term.call("jacobian", small.nz[:], *self._symbols, compiled=self.compiled))
+            nonzeros.append(term.call("jacobian", small.nz[:], *self._symbols, kernels=self._kernels))
             row, column = (np.array(part) for part in small.sparsity().get_triplet())
             copy = np.arange(term.copies)[:, None]
             source, rows, up = _expand(term.scatter.tocsc(), (copy * term.values.numel() + row).ravel())
@@ -163,9 +174,7 @@ class Assembled:
             if small.nnz() == 0:
                 continue
             values = ca.mtimes(to_dm(term.scatter.T.tocsr()), multipliers)
-            nonzeros.append(
-                term.call("hessian", small.nz[:], *self._symbols, weights, values, compiled=self.compiled)
-            )
+            nonzeros.append(term.call("hessian", small.nz[:], *self._symbols, weights, values, self._kernels))
             row, column = (np.array(part) for part in small.sparsity().get_triplet())
             # the other triangle of a small Hessian may reach the upper one of the large
             mirrored = np.flatnonzero(row != column)

@@ -36,7 +36,11 @@ class Track:
 
     def values(self, w: np.ndarray, element: np.ndarray, place: np.ndarray) -> np.ndarray:
         """The signal (k,) at places of elements."""
-        return np.einsum("km,km->k", self.basis(element, place), w[self.unknowns[element]])
+        return self.weighted(self.basis(element, place), w, element)
+
+    def weighted(self, basis: np.ndarray, w: np.ndarray, element: np.ndarray) -> np.ndarray:
+        """The signal (k,) by the weights of the nodes of the named elements."""
+        return np.einsum("km,km->k", basis, w[self.unknowns[element]])
 
 
 def lagrange(nodes: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -104,6 +108,15 @@ class Layout:
         mine = np.flatnonzero(self.owner == signal)
         return self.first + mine[np.argsort(self.moment[mine], kind="stable")]
 
+    def bases(self, element: np.ndarray, place: np.ndarray) -> list[np.ndarray]:
+        """Weights of the nodes of every track at places of elements; tracks on the same nodes share theirs."""
+        found: dict[tuple[type, int], np.ndarray] = {}
+        for track in self.tracks:
+            key = type(track), id(track.nodes)
+            if key not in found:
+                found[key] = track.basis(element, place)
+        return [found[type(track), id(track.nodes)] for track in self.tracks]
+
     def placed(self, w: np.ndarray) -> Mesh:
         """The mesh with its moving borders as they stand among the unknowns."""
         return self.mesh.placed(w[self.knots]) if self.knots.size else self.mesh
@@ -135,8 +148,8 @@ class Places:
         local = len(layout.tracks) + nf + (2 if moving else 0)
         point = np.arange(element.size) * local
         rows, unknowns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
-        for i, track in enumerate(layout.tracks):
-            basis = track.basis(element, place)
+        bases = layout.bases(element, place)
+        for i, (track, basis) in enumerate(zip(layout.tracks, bases, strict=True)):
             r, c = np.nonzero(basis)
             rows.append(point[r] + i)
             unknowns.append(track.unknowns[element[r], c])

@@ -16,6 +16,7 @@ from gantrytau_optimica.transcription.point_functions import Place, places_of_po
 from gantrytau_optimica.transcription.scheme import Collocation
 
 FEW = 1e-5  # of an element, by which a moving point may stand outside of it
+FLAT = 1e-6  # of the gradient beside the guess: that at the guess vanishes by accident
 CLOSE = 1e-2  # of its margin: what is closer rests on it
 
 
@@ -73,6 +74,17 @@ class Program:
                 mine = mine[lower[mine] == old.min / places.scale[mine]]  # others have limits of the user
                 lower[mine] = new.min / places.scale[mine]
         return replace(self, problem=problem, lbw=lower, ubw=upper)
+
+    @cached_property
+    def objective_gradient(self) -> tuple[np.ndarray, np.ndarray]:
+        """Finite derivatives of the objective by scaled unknowns at the guess, and those that tell its size."""
+        x = first_guess(self) / self.places.scale
+        beside = np.clip(x + 0.5 * np.sin(1.0 + 7.3 * np.arange(x.size)), self.lbw, self.ubw)
+        at_guess, near = (
+            np.abs(found[np.isfinite(found)])
+            for found in (np.array(self.assembled.grad_f(w, ca.DM(0, 1))[1]).ravel() for w in (x, beside))
+        )
+        return at_guess, at_guess if np.sum(at_guess) > FLAT * np.sum(near) else near
 
     def astray(self, w: np.ndarray) -> bool:
         """Whether a point whose time moves has left the element whose polynomials it reads."""

@@ -92,7 +92,11 @@ class Trajectory:
         """The same at places of elements."""
         if times is None:
             times = self.times(self.mesh.borders[element] + place * self.mesh.widths[element])
-        rows = [track.values(self.w, element, place) for track in self.layout.tracks]
+        bases = self.layout.bases(element, place)
+        rows = [
+            track.weighted(basis, self.w, element)
+            for track, basis in zip(self.layout.tracks, bases, strict=True)
+        ]
         at_start = (element == 0) & (place <= 0.0)
         if self.layout.begin.size and np.any(at_start):
             for k, unknown in enumerate(self.layout.begin, len(self.phase.states)):

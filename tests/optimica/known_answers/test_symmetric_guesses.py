@@ -5,7 +5,7 @@ import pytest
 
 from gantrytau import Fixed, Input, Real, cos, der
 from gantrytau_optimica import Free, Optimization, final, optimize
-from tests.optimica.problems import Mass
+from tests.optimica.problems import BoundedOscillator, Mass
 
 
 def test_a_guess_at_the_maximum_is_left_for_either_side():
@@ -70,3 +70,7 @@ def test_a_minimum_is_not_searched_again():
     assert optimum.iterations <= 1
     assert optimum.status == "solved"
     assert optimum.objective == 0.0
+
+
+def test_steps_without_regularisation_tell_a_minimum():
+    assert optimize(BoundedOscillator, elements=20).solution.upright

@@ -2,11 +2,13 @@
 
 import gc
 import weakref
+from typing import Any
 
 from gantrytau import Input, Model, Parameter, Real, between, der
-from gantrytau_optimica import Free, Optimization, final, initial, optimize
+from gantrytau_optimica import Free, Optimization, final, initial, optimize, prepare
 from gantrytau_optimica.problem.kept_reading import MOST
 from gantrytau_optimica.problem.read_problem import read_problem
+from gantrytau_optimica.transcription.assemble import Assembled
 
 
 class Mass(Model):
@@ -56,6 +58,23 @@ def test_the_fastest_motion_follows_a_limit_that_changes():
     for limit, time in ((1.0, 2.0), (1.0, 2.0), (4.0, 1.0)):  # s, 2 sqrt(distance * mass / force)
         limits[0] = limit
         assert abs(optimize(problem, elements=4).final_time - time) < 1e-6
+
+
+def test_a_program_is_made_anew_for_another_mesh_method_or_form_and_for_kernels_that_are_awaited(monkeypatch):
+    problem = moved([1.0])
+
+    def made(**policy: Any) -> Assembled:
+        return prepare(problem, **policy).program.assembled
+
+    first = made(elements=4)
+    assert made(elements=[1, 1, 1, 1]) is first
+    others = dict(elements=5), dict(points=2), dict(scheme="gauss"), dict(lengths="free"), dict(refine=1e-4)
+    for other in (*others, dict(compile=False), dict(controls={"mass.u": dict(kind="constant")})):
+        assert made(**{"elements": 4, **other}) is not made(elements=4)
+    last = made(elements=4)
+    assert made(elements=4) is last
+    monkeypatch.setattr(Assembled, "awaited", True)
+    assert made(elements=4) is not last
 
 
 def test_few_problems_are_kept():

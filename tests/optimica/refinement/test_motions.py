@@ -1,6 +1,10 @@
 """Answers on meshes on which they are no motion of the model, solved again on finer ones."""
 
+import numpy as np
+from scipy.linalg import expm
+
 from gantrytau_optimica import optimize
+from gantrytau_optimica.refinement.motions import exponentials
 from tests.optimica.answers.test_playback import Caught
 
 
@@ -25,3 +29,11 @@ class ShortCaught(Caught):
 
 def test_a_coarse_mesh_that_leads_to_the_end_is_kept():
     assert optimize(ShortCaught, elements=20).breaks.size == 19
+
+
+def test_exponentials_of_many_matrices_are_those_of_each():
+    matrices = np.random.default_rng(0).normal(size=(4, 3, 5, 5))
+    matrices[0], matrices[1], matrices[2] = 0.0, 1e-9 * matrices[1], 10.0 * matrices[2]
+    for one, found in zip(matrices.reshape(-1, 5, 5), exponentials(matrices).reshape(-1, 5, 5), strict=True):
+        expected = expm(one)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())

@@ -9,6 +9,7 @@ import pytest
 from gantrytau import kernels
 from gantrytau.commands.demo.motion_problems import FreePath
 from gantrytau_optimica import optimize, prepare
+from gantrytau_optimica.problem import kept_reading
 from gantrytau_optimica.transcription import assemble
 from gantrytau_optimica.transcription.program import first_guess
 from tests.optimica.known_answers.closed_loops import carried
@@ -23,8 +24,9 @@ def at_once(tmp_path, monkeypatch):
     monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))
     monkeypatch.setattr(kernels, "WORTH", 0)
     monkeypatch.setattr(kernels, "LEAST", 0)
+    monkeypatch.setattr(kept_reading, "_KEPT", {})
     monkeypatch.setattr(
-        assemble, "kernel", lambda function, calls: kernels.kernel(function, calls, wait=True)
+        assemble, "kernel_for", lambda function, calls: kernels.kernel_for(function, calls, wait=True)
     )
     return lambda: len(list((tmp_path / "kernels").glob("*-*")))
 

@@ -78,9 +78,7 @@ class Completion:
             outright = closed.get(places[0]) if len(places) == 1 else None
             r, x = residuals[list(own)], unknowns[list(places)]
             results = [r, ca.jacobian(r, x)] if outright is None else [outright]
-            function = ca.Function(
-                "block", [knowns, unknowns], [ca.densify(e) for e in results], {"cse": True}
-            )
+            function = ca.Function("block", [knowns, unknowns], [ca.densify(e) for e in results])
             self.blocks.append(NewtonBlock(function, np.array(places), outright is not None))
 
     def along(self, begin: np.ndarray, start: np.ndarray, knowns: np.ndarray) -> np.ndarray:
