@@ -116,8 +116,8 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
 
 def _project(rest: np.ndarray, sizes: np.ndarray, column: int) -> None:
     """Take the direction of a column out of all columns, of which only those change that share a row with it."""
-    direction = rest[:, column] / sizes[column]
-    rows = np.flatnonzero(direction)
+    direction = rest[:, column] / np.linalg.norm(rest[:, column])
+    rows = np.flatnonzero(direction) if rest.size > DENSE else np.arange(len(rest))
     shares = direction[rows] @ rest[rows]
     touched = np.flatnonzero(shares)
     rest[np.ix_(rows, touched)] -= np.outer(direction[rows], shares[touched])
