@@ -92,7 +92,7 @@ def _common(placed: Placed) -> dict[str, Any]:
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
         chosen=placed.chosen,
         owner=placed.path,
-        free=getattr(placed.declaration, "free", False),
+        free=getattr(type(placed.declaration), "free", False),
         undetermined=attributes["undetermined"].value,
         **limits,
     )

@@ -186,8 +186,10 @@ class _Growing(Instance):
                 f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
                 f"model; expected another name, as {full}_left"
             )
-        declared = {key: getattr(declaration, key, None) for key in ATTRIBUTES}
-        attributes = {key: Leaf(value, instance) for key, value in declared.items() if value is not None}
+        declared = vars(declaration)
+        attributes = {
+            key: Leaf(declared[key], instance) for key in ATTRIBUTES if declared.get(key) is not None
+        }
         if (
             isinstance(modification, Leaf)
             and isinstance(modification.value, Quantity)
@@ -211,7 +213,8 @@ class _Growing(Instance):
         shape = _shape(declaration, attributes, instance, full)
         names = element_names(full, shape, instance.first_index)
         kind = declaration.kind
-        vector = ca.vertcat(*(self.symbols.add(element, kind).sx for element in names))
+        scalars = [self.symbols.add(element, kind).sx for element in names]
+        vector = scalars[0] if shape == () else ca.vertcat(*scalars)
         symbol = ca.reshape(vector, shape[0], shape[1]) if len(shape) == 2 else vector
         instance.__dict__[name] = symbol
         if isinstance(declaration, Mode):

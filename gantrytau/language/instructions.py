@@ -48,7 +48,8 @@ def refuse_calls(place: str, *expressions: ca.SX) -> None:
     CasADi evaluates it, but the derivative of such a call ends Python or is NaN (casadi 3.8).
     """
     whole = ca.SX(ca.veccat(*expressions))
-    called = ca.Function("calls", ca.symvar(whole), [whole]).find_functions(0)
+    leaves = ca.vertcat(ca.SX(0, 1), *ca.symvar(whole))
+    called = ca.Function("calls", [leaves], [whole]).find_functions(0)
     if called:
         raise ModelError(
             f"{place}: found a call of the function '{called[0].name()}', a table or a function from outside, "
