@@ -55,7 +55,7 @@ def sizes_at(residual: ca.Function, start: ca.DM, begin: ca.DM) -> tuple[ca.DM, 
     numbers = np.array(ca.Function("jacobian", *_with_jacobian(residual))(start, begin))
     if not np.all(np.isfinite(numbers)):
         return ca.DM.ones(start.numel()), ca.DM.ones(start.numel())
-    columns = 1 / Scales.of(ca.SX(numbers), numbers[None]).columns
+    columns = 1 / Scales.of(ca.SX(numbers), numbers.ravel(order="F")[None]).columns
     rows = np.abs(numbers * columns).max(axis=1)
     return ca.DM(np.where(rows > 0, rows, 1.0)), ca.DM(columns)
 

@@ -164,7 +164,8 @@ class _Elimination:
                 changed = True
                 for i in used:
                     del sums[i]
-                    remaining.remove(i)
+                gone = set(used)
+                remaining = [i for i in remaining if i not in gone]
             for i, terms in sums.items():  # what cancels but for its rounding determines nothing
                 rooted = self._rooted(terms)
                 if not rooted.factors or len(rooted.left()) < len(rooted.factors):
@@ -177,7 +178,7 @@ class _Elimination:
                 self.residuals[i] = new
         # what became 0 == 0 repeats other equations: two ends that both say that they carry no torque
         redundant = [i for i in remaining if self.residuals[i].is_zero()]
-        remaining = [i for i in remaining if i not in redundant]
+        remaining = [i for i in remaining if not self.residuals[i].is_zero()]
         aliases = {n: self.root(n, 0) for v in self.flat.variables for n in v.elements}
         roots = (n for n, alias in aliases.items() if alias.root == n and alias.order == 0)
         unknowns = tuple(n for n in roots if n not in self.known)

@@ -112,7 +112,7 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
     folded -= loose
     values: dict[str, float] = {}
     expressions: dict[str, ca.SX] = {}
-    independent: list[str] = []
+    independent: set[str] = set()
     for name in order:
         binding = bindings[name]
         if binding.is_symbolic():
@@ -136,11 +136,11 @@ def parameter_table(flat: FlatModel, keep: frozenset[str] = frozenset()) -> Para
                 old, new = (column([of[n] for n in inner]) for of in (symbols, expressions))
                 expressions[name] = ca.substitute(binding, old, new) if inner else binding
         else:
-            independent.append(name)
+            independent.add(name)
     _check_limits(flat, values)
     _check_requirements(flat, values, symbols)
-    declared = [n for p in flat.parameters for n in p.elements]
-    return ParameterTable(tuple(n for n in declared if n in set(independent)), values, expressions, symbols)
+    declared = (n for p in flat.parameters for n in p.elements if n in independent)
+    return ParameterTable(tuple(declared), values, expressions, symbols)
 
 
 def _check_limits(flat: FlatModel, values: Mapping[str, float]) -> None:

@@ -46,7 +46,8 @@ class Constraints:
     @property
     def moving(self) -> list[str]:
         """The unknowns that occur."""
-        return [n for n in self.level.unknowns if n in set(self.level.leaves)]
+        leaves = set(self.level.leaves)
+        return [n for n in self.level.unknowns if n in leaves and n not in self.known]
 
     @property
     def firm(self) -> int:
@@ -161,7 +162,7 @@ def _constraints(flat: FlatModel, reduced: Reduced, duals: Sequence[Equation]) -
     level = Level(
         (*(reduced.residuals[i] for i in rows), *closing.elements()),
         (*(reduced.equations[i].name for i in rows), *(e.name for e in duals)),
-        tuple(n for n in reduced.unknowns if n in unknown),
+        (*(n for n in reduced.unknowns if n in unknown), *sorted(reduced.known)),
     )
     return Constraints(level, tuple(duals), reduced.known)
 
@@ -177,7 +178,7 @@ def _close(
     return solve_levels(
         [constraints.level],
         values,
-        held=guess.fixed,
+        held=guess.fixed | constraints.known,
         started=guess.started,
         chosen=guess.chosen,
         title=title,

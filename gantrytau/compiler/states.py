@@ -16,6 +16,7 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import dependent
 from gantrytau.compiler.start.balance import balance
+from gantrytau.compiler.start.newton import DENSE
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import derivative_name, split_derivative
@@ -89,27 +90,38 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
     groups: dict[int, list[int]] = {}
     for place in range(len(columns)):
         groups.setdefault(weights[place], []).append(place)
-    rest = matrix.copy()
     norms = np.linalg.norm(matrix, axis=0)
+    rest, sizes = matrix.copy(), norms.copy()
     chosen: list[int] = []
     rounds = [(GOOD_PIVOT, w) for w in sorted(groups) if w <= StateSelect.ALWAYS]
     rounds += [(LEAST_PIVOT, w) for w in sorted(groups)]  # what is asked for is given up last
     for least, weight in rounds:
-        candidates = [j for j in groups[weight] if j not in chosen]
-        while len(chosen) < len(rows) and candidates:
-            sizes = np.linalg.norm(rest[:, candidates], axis=0)
-            best = int(np.argmax(sizes))
-            if not sizes[best] > least * max(norms[candidates[best]], 1e-12):
+        candidates = np.setdiff1d(groups[weight], chosen).astype(int)
+        while len(chosen) < len(rows) and candidates.size:
+            best = int(np.argmax(sizes[candidates]))
+            column = int(candidates[best])
+            if not sizes[column] > least * max(norms[column], 1e-12):
                 break
-            column = candidates.pop(best)
-            direction = rest[:, column] / np.linalg.norm(rest[:, column])
-            rest -= np.outer(direction, direction @ rest)
+            candidates = np.delete(candidates, best)
+            _project(rest, sizes, column)
             chosen.append(column)
     if len(chosen) < len(rows):
         raise dependent(title, [reduced.equations[i] for i in rows], matrix, LEAST_PIVOT)
-    if _condition(matrix[:, chosen]) > ILL:
+    condition = _condition(matrix[:, chosen])
+    if condition > ILL:
         chosen = _exchanged(matrix, chosen, weights)
-    return [columns[j] for j in sorted(chosen)], _condition(matrix[:, chosen])
+        condition = _condition(matrix[:, chosen])
+    return [columns[j] for j in sorted(chosen)], condition
+
+
+def _project(rest: np.ndarray, sizes: np.ndarray, column: int) -> None:
+    """Take the direction of a column out of all columns, of which only those change that share a row with it."""
+    direction = rest[:, column] / np.linalg.norm(rest[:, column])
+    rows = np.flatnonzero(direction) if rest.size > DENSE else np.arange(len(rest))
+    shares = direction[rows] @ rest[rows]
+    touched = np.flatnonzero(shares)
+    rest[np.ix_(rows, touched)] -= np.outer(direction[rows], shares[touched])
+    sizes[touched] = np.linalg.norm(rest[:, touched], axis=0)
 
 
 def _exchanged(matrix: np.ndarray, chosen: Sequence[int], weights: Sequence[int]) -> list[int]:
@@ -138,8 +150,26 @@ def _exchanged(matrix: np.ndarray, chosen: Sequence[int], weights: Sequence[int]
 
 
 def _condition(matrix: np.ndarray) -> float:
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return float(values[0] / values[-1]) if values.size else 1.0
+    """The ratio of the largest to the smallest singular value; parts that share no row or column have their own ones."""
+    values = np.concatenate(
+        [np.linalg.svd(part, compute_uv=False) for part in _parts(matrix)] or [np.ones(1)]
+    )
+    return float(values.max() / values.min())
+
+
+def _parts(matrix: np.ndarray) -> list[np.ndarray]:
+    """The blocks of a square matrix that share no row or column; a small matrix stays whole."""
+    if matrix.size <= DENSE:
+        return [matrix] if matrix.size else []
+    from scipy.sparse import block_array, csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    entries = csr_array(matrix)
+    count, part = connected_components(block_array([[None, entries], [entries.T, None]]))
+    rows, columns = np.split(part, 2)
+    if np.any(np.bincount(rows, minlength=count) != np.bincount(columns, minlength=count)):
+        return [matrix]
+    return [matrix[np.ix_(rows == k, columns == k)] for k in range(count)]
 
 
 def _scaled_condition(matrix: np.ndarray) -> float:

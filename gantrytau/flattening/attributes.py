@@ -94,7 +94,9 @@ def _common(placed: Placed) -> dict[str, Any]:
         fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
         chosen=placed.chosen,
         owner=placed.path,
-        free=bool(attributes["free"].value) if "free" in attributes else False,
+        free=bool(attributes["free"].value)
+        if "free" in attributes
+        else getattr(type(placed.declaration), "free", False),
         undetermined=attributes["undetermined"].value,
         **limits,
     )

@@ -63,7 +63,8 @@ def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
     """The same for other equations in the symbols of a model, group after group."""
     units = symbol_units(flat)
     quantities = (*flat.variables, *flat.parameters, *flat.propagated)
-    symbols = [flat.time, *(s for v in quantities for s in v.symbol.elements() if s.is_symbolic())]
+    symbols = [flat.time, *ca.vertcat(ca.SX(0, 1), *(ca.vec(v.symbol) for v in quantities)).elements()]
+    symbols = [s for s in symbols if s.is_symbolic()]
     symbols += [*flat.derivatives.values(), *flat.before.values()]
     clock, *_ = names = [s.name() for s in symbols]  # the time stands first
     known = [Dimensioned(units[name], name, clock=name == clock) for name in names]
@@ -83,9 +84,11 @@ def check_equations(flat: FlatModel, *groups: Sequence[Equation]) -> None:
 
 def _events(flat: FlatModel) -> list[Equation]:
     """Equations whose units agree if those of statements on instants do; a condition agrees with itself."""
+    found = sides((*flat.sampled, *flat.frictions, *flat.whens, *flat.delays))
+    if not found:
+        return []
     symbols = {n: s for v in flat.variables for n, s in zip(v.elements, v.symbol.elements(), strict=True)}
     symbols[flat.time.name()] = flat.time
-    found = sides((*flat.sampled, *flat.frictions, *flat.whens, *flat.delays))
     return [replace(e, left=symbols.get(e.left.name(), e.right)) for e in found]
 
 
@@ -93,13 +96,12 @@ def _attributes(flat: FlatModel) -> list[Equation]:
     """Formulas of parameters, starts, limits and requirements as equations."""
     found: list[Equation] = []
     for one in (*flat.variables, *flat.parameters):
-        stated = {key: getattr(one, key, None) for key in ("value", "start", "min", "max", "nominal")}
-        for key, formulas in stated.items():
-            for name, symbol, formula in zip(
-                one.elements, one.symbol.elements(), formulas or (), strict=False
-            ):
+        for key in ("value", "start", "min", "max", "nominal"):
+            formulas = getattr(one, key, None) or ()
+            for k, formula in enumerate(formulas):
                 if not formula.is_constant():
-                    found.append(Equation(symbol, formula, one.owner, "", 0, label=f"{name}: {key}"))
+                    label, symbol = f"{one.elements[k]}: {key}", one.symbol.elements()[k]
+                    found.append(Equation(symbol, formula, one.owner, "", 0, label=label))
     for one in flat.requirements:
         condition, label = ca.SX(one.condition), f"{one.path or 'the model'}: require"
         found.append(Equation(condition, condition, one.path, one.model, 0, label=label))

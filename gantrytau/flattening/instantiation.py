@@ -186,8 +186,10 @@ class _Growing(Instance):
                 f"{full}: found a quantity of the outermost model with the name of the time, of which there is one in every "
                 f"model; expected another name, as {full}_left"
             )
-        declared = ((key, getattr(declaration, key, None)) for key in ATTRIBUTES)
-        attributes = {key: Leaf(value, instance) for key, value in declared if value is not None}
+        declared = vars(declaration)
+        attributes = {
+            key: Leaf(declared[key], instance) for key in ATTRIBUTES if declared.get(key) is not None
+        }
         if (
             isinstance(modification, Leaf)
             and isinstance(modification.value, Quantity)

@@ -50,7 +50,8 @@ def refuse_calls(place: str, *expressions: ca.SX) -> None:
     if all(one.is_scalar() and one.n_dep() == 0 for one in expressions):
         return
     whole = ca.SX(ca.veccat(*expressions))
-    called = ca.Function("calls", ca.symvar(whole), [whole]).find_functions(0)
+    leaves = ca.vertcat(ca.SX(0, 1), *ca.symvar(whole))
+    called = ca.Function("calls", [leaves], [whole]).find_functions(0)
     if called:
         raise ModelError(
             f"{place}: found a call of the function '{called[0].name()}', a table or a function from outside, "

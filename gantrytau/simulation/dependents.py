@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
+from gantrytau.compiler.blocks.tearing import entry_sizes, moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.compiler.translated import Translated
@@ -26,7 +26,7 @@ def dependents(dae: Translated) -> list[tuple[int, str]]:
     f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
     x = ca.vertcat(*(chains.sx(n, indexed.orders[n]) for n in columns))
     jacobian = ca.jacobian(f, x)
-    numbers = values_at(jacobian, dae.start)[None]
+    numbers = values_at(jacobian, dae.start)
     # only an equation that is differentiated as often as the variable gives it as it is
     positions = ca.vertcat(*(chains.sx(n) for n in columns))
     smooth = switched([ca.vertcat(*(indexed.residuals[i, 0] for i in rows))], set(columns))
@@ -43,7 +43,7 @@ def dependents(dae: Translated) -> list[tuple[int, str]]:
     states = {split_derivative(n)[0] for n in dae.choice.states}
     torn = tear(
         jacobian,
-        np.where(whole[None], numbers, 0.0),
+        entry_sizes(jacobian, np.where(whole, numbers, 0.0)[*jacobian.sparsity().get_triplet()][None]),
         x,
         relaxed=True,
         partner={},

@@ -54,6 +54,13 @@ class Guide:
 
     def around(self, expression: ca.SX) -> np.ndarray:
         """The numbers of an expression at the start, then at points around it, (points, rows, columns)."""
+        entries = self.entries_around(expression)
+        found = np.zeros((len(entries), *expression.shape))
+        found[:, *expression.sparsity().get_triplet()] = entries
+        return found
+
+    def entries_around(self, expression: ca.SX) -> np.ndarray:
+        """The same of its nonzeros alone, (points, nonzeros)."""
         (resolved,) = Substitution(tuple(self._solved)).inserted([expression])
         leaves = ca.symvar(resolved)
         function = ca.Function("sample", [ca.vertcat(*leaves)], [resolved])
@@ -63,11 +70,7 @@ class Guide:
         points = centre[:, None] + steps * (moves * np.maximum(np.abs(centre), 1.0))[:, None]
         nonzeros = np.array([called(function, point)[0] for point in points.T])
         nonzeros = nonzeros[np.isfinite(nonzeros).all(axis=1)]  # the others are out of reach
-        found = np.zeros((len(nonzeros) + 1, *expression.shape))
-        rows, columns = resolved.sparsity().get_triplet()
-        found[0] = self.at_start(expression)
-        found[1:, rows, columns] = nonzeros
-        return found
+        return np.vstack([self.at_start(expression)[tuple(expression.sparsity().get_triplet())], nonzeros])
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +86,22 @@ class Scales:
     start: np.ndarray
 
     @classmethod
-    def of(cls, matrix: ca.SX, numbers: np.ndarray, needed: Set[int] | None = None) -> "Scales":
-        """Those of the rows of a matrix that are needed (None: all); numbers: at the start and around it, (points, n, n)."""
-        largest = np.abs(numbers).max(axis=(0, 2))
-        scaled = np.abs(numbers) / np.where(largest > 0, largest, 1.0)[None, :, None]
-        sizes = scaled.max(axis=(0, 1), initial=0.0)
+    def of(cls, matrix: ca.SX, entries: np.ndarray, needed: Set[int] | None = None) -> "Scales":
+        """Those of the rows of a square matrix that are needed (None: all).
+
+        entries: numbers of its nonzeros at the start and around it, (points, nonzeros).
+        """
+        n = matrix.shape[0]
+        i, j = matrix.sparsity().get_triplet()
+        found, at_start = np.zeros((n, n)), np.zeros((n, n))
+        found[i, j], at_start[i, j] = np.abs(entries).max(axis=0), np.abs(entries[0])
+        largest = found.max(axis=1, keepdims=True)
+        sizes = (found / np.where(largest > 0, largest, 1.0)).max(axis=0, initial=0.0)
         sizes = np.where(sizes > 0, sizes, 1.0)
         rows = tuple(
-            extent(matrix[i, :], sizes) if needed is None or i in needed else ca.SX(0)
-            for i in range(matrix.shape[0])
+            extent(matrix[k, :], sizes) if needed is None or k in needed else ca.SX(0) for k in range(n)
         )
-        return cls(sizes, rows, (np.abs(numbers[0]) / sizes).sum(axis=1))
+        return cls(sizes, rows, (at_start / sizes).sum(axis=1))
 
     def at(self, rows: Sequence[int], columns: Sequence[int]) -> "Scales":
         """The same of some rows, as whole as they were, and columns."""

@@ -15,7 +15,7 @@ from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pieces import in_pieces, solve_by_value
 from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
-from gantrytau.compiler.blocks.tearing import moving, switching_places, tear
+from gantrytau.compiler.blocks.tearing import entry_sizes, moving, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.symbol_spaces import Substitution, column
 from gantrytau.language.piecewise import Switched, may_switch, switched, with_modes
@@ -149,7 +149,7 @@ def solve_block(
     jacobian = ca.jacobian(smooth.expressions[0], x)
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     (present,) = with_modes(smooth, [jacobian])
-    numbers = guide.around(present)
+    numbers = guide.entries_around(present)
     barred = switching_places(smooth, x)
     partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
@@ -163,9 +163,9 @@ def solve_block(
         dict(first=first, barred=changing | barred),
         dict(first=first, barred=doubtful | barred if guide.careful else barred),
     ]
-    tried = []
+    tried, sizes = [], entry_sizes(jacobian, numbers)
     for way in ways:
-        tried.append(tear(jacobian, numbers, x, relaxed=linear, partner=partner, **way))
+        tried.append(tear(jacobian, sizes, x, relaxed=linear, partner=partner, **way))
         if len(tried[-1].tears) <= max(len(first), 1):
             break
     torn = min(tried, key=lambda one: len(one.tears))
@@ -182,7 +182,8 @@ def solve_block(
     scales = whole.at(torn.residuals, torn.tears) if linear and not smooth.switches else None
     switching = bool(smooth.switches)
     block = _finish(equations, unknowns, tears, tuple(left), tuple(inner), guide, scales, switching)
-    margins = (whole.margin(i, j, present[i, j], numbers[0, i, j]) for i, j in divided)
+    pivots = dict(zip(zip(*present.sparsity().get_triplet(), strict=True), numbers[0].tolist(), strict=True))
+    margins = (whole.margin(i, j, present[i, j], pivots[i, j]) for i, j in divided)
     return replace(
         block,
         pairs=tuple((equations[i], unknowns[j]) for i, j in torn.assignments),

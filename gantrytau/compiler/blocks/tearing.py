@@ -28,7 +28,7 @@ class Torn:
 
 def tear(
     jacobian: ca.SX,
-    numbers: np.ndarray,
+    sizes: np.ndarray,
     x: ca.SX,
     *,
     relaxed: bool,
@@ -36,32 +36,29 @@ def tear(
     first: Set[int],
     barred: Set[tuple[int, int]],
 ) -> Torn:
-    """Tear a square block with the given symbolic Jacobian and its numbers at sample points, (points, n, n).
+    """Tear a square block with the given symbolic Jacobian; sizes: of its nonzeros, as `entry_sizes` finds them.
 
     relaxed: accept pivots that depend on unknowns of the block (linear blocks, where none does);
     partner: by row the only column it may be solved for, or -1, where lower derivatives have decided;
     first: columns that are torn before others; barred: places that are not divided by.
     """
-    largest = np.abs(numbers).max(axis=2, keepdims=True)
-    sizes = reliable(numbers, largest)
-    rows, columns = jacobian.sparsity().get_triplet()
     incidence: dict[int, set[int]] = {i: set() for i in range(jacobian.shape[0])}
-    entries = list(zip(rows, columns, jacobian.nonzeros(), strict=True))
-    for i, j, _ in entries:
+    entries = list(zip(*jacobian.sparsity().get_triplet(), jacobian.nonzeros(), sizes.tolist(), strict=True))
+    for i, j, *_ in entries:
         incidence[i].add(j)
 
     def solvable(least: float) -> set[tuple[int, int]]:
         """Places that may be divided by; least: what constants need of their row."""
         found: set[tuple[int, int]] = set()
-        for i, j, entry in entries:
+        for i, j, entry, size in entries:
             if (i, j) in barred:
                 large = False
             elif i in partner:
-                large = partner[i] == j and sizes[i, j] > 0
+                large = partner[i] == j and size > 0
             elif entry.is_constant():
-                large = sizes[i, j] >= least
+                large = size >= least
             else:
-                large = (relaxed or not ca.depends_on(entry, x)) and sizes[i, j] >= RELAXED_PIVOT
+                large = size >= RELAXED_PIVOT and (relaxed or not ca.depends_on(entry, x))
             if large:
                 found.add((i, j))
         return found
@@ -70,6 +67,17 @@ def tear(
     return (
         torn if torn.assignments else _search(incidence, solvable(LEAST_PIVOT), first, set(partner.values()))
     )
+
+
+def entry_sizes(jacobian: ca.SX, entries: np.ndarray) -> np.ndarray:
+    """How large the nonzeros of a Jacobian are in their rows at all sample points.
+
+    entries: their numbers, (points, nonzeros).
+    """
+    rows = np.array(jacobian.sparsity().get_triplet()[0], dtype=int)
+    largest = np.zeros((jacobian.shape[0], len(entries)))
+    np.maximum.at(largest, rows, np.abs(entries).T)
+    return reliable(entries, largest[rows].T)
 
 
 def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:

@@ -18,7 +18,10 @@ ROUNDING = 1e-14  # of what unknowns of size one contribute, what is left of equ
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Equations that are solved together: residuals, and unknown symbols; exact: symbols whose numbers are given."""
+    """Equations that are solved together: residuals, and unknown symbols; exact: symbols whose numbers are given.
+
+    Derivatives are those by the unknowns: by what earlier levels have found they would be far longer.
+    """
 
     residuals: tuple[ca.SX, ...]
     names: tuple[str, ...]  # of the residuals, for messages
@@ -40,14 +43,21 @@ class Level:
     @cached_property
     def symbolic(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         residual = ca.vertcat(*self.residuals)
-        x = ca.vertcat(*ca.symvar(residual))
-        return x, ca.densify(residual), ca.jacobian(residual, x)
+        leaves = ca.symvar(residual)
+        inside = column([leaves[k] for k in self._inside])
+        return column(leaves), ca.densify(residual), ca.jacobian(residual, inside)
 
     @cached_property
     def entries(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows and columns of the derivatives that are not structurally zero."""
+        """Rows, and places among the leaves, of the derivatives that are not structurally zero."""
         rows, columns = self.symbolic[2].sparsity().get_triplet()
-        return np.array(rows, dtype=int), np.array(columns, dtype=int)
+        return np.array(rows, dtype=int), self._inside[np.array(columns, dtype=int)]
+
+    @cached_property
+    def _inside(self) -> np.ndarray:
+        """Places of the unknowns among the leaves."""
+        unknowns = set(self.unknowns)
+        return np.array([k for k, n in enumerate(self.leaves) if n in unknowns], dtype=int)
 
     @cached_property
     def place(self) -> dict[str, int]:
@@ -97,12 +107,12 @@ class Level:
         return {}
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals, and the entries of their derivatives by the leaves, at numbers of the leaves."""
+        """Residuals, and the entries of their derivatives, at numbers of the leaves."""
         residual, nonzeros = called(self._function, numbers)
         return residual, nonzeros
 
     def jacobian(self, nonzeros: np.ndarray) -> np.ndarray:
-        """The derivatives by the leaves as a dense matrix."""
+        """The derivatives as a dense matrix with a column for each leaf."""
         found = np.zeros((len(self.residuals), len(self.leaves)))
         found[self.entries] = nonzeros
         return found
