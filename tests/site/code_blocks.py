@@ -3,7 +3,7 @@
 | block | what is done with it |
 |---|---|
 | ```python | runs, one after the other, in the names of the page; it is saved as `cart.py` if it begins with `# cart.py` |
-| ```toml, ```csv | saved, if it begins with `# cell.toml` |
+| ```toml, ```csv, ```modelica | saved, if it begins with `# cell.toml` or `// cart.mo` |
 | ```console | commands behind `$ ` run; what they print stands below them |
 | ```text behind a python block | what that prints; or the error that it ends with, `ModelError: ...` |
 
@@ -33,7 +33,7 @@ from typing import Any
 import matplotlib as mpl
 
 BLOCK = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-SAVED = re.compile(r"# ([\w./-]+\.(?:py|toml|csv))\n")
+SAVED = re.compile(r"(?:#|//) ([\w./-]+\.(?:py|toml|csv|mop?))\n")
 BEHIND = re.compile(r"```\s*```text[^\n]*\n")
 COMMANDS = re.compile(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 ERROR = re.compile(r"^(?:\w+\.)*(\w+(?:Error|Exception)):\s", re.MULTILINE)
