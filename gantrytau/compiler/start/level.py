@@ -78,12 +78,16 @@ class Level:
 
     def sizes(self, rows: Sequence[int], numbers: np.ndarray) -> np.ndarray:
         """How large the terms of some residuals are, at numbers of the leaves."""
-        key = tuple(rows)
-        if key not in self._sizes:
-            x, _, _ = self.symbolic
+        key, every = tuple(rows), tuple(range(len(self.residuals)))
+        if self._sizes and key not in self._sizes:  # of all at once, rather than of others again and again
+            return self._sized(every, numbers)[list(rows)]
+        return self._sized(key, numbers)
+
+    def _sized(self, rows: tuple[int, ...], numbers: np.ndarray) -> np.ndarray:
+        if rows not in self._sizes:
             terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
-            self._sizes[key] = ca.Function("sizes", [x], [terms])
-        return called(self._sizes[key], numbers)[0]
+            self._sizes[rows] = ca.Function("sizes", [self.symbolic[0]], [terms])
+        return called(self._sizes[rows], numbers)[0]
 
     @cached_property
     def _sizes(self) -> dict[tuple[int, ...], ca.Function]:
