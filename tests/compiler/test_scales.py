@@ -157,6 +157,12 @@ def test_a_loop_of_any_size_is_not_closed_beside_its_plane(size):
     assert np.isnan(float(function(1.3, [size, 0.0, 1e-4 * size])))
 
 
+def test_a_small_acceleration_at_the_start_is_right_beside_large_ones():
+    x = 1e-13  # beside a weight of 9.81 N: y'' = x x'' of a rod of 1 m that hangs
+    start = translate(Pendulum(x=Start(x), y=Start(-1.0))).start
+    assert start["der(der(y))"] == pytest.approx(-9.81 * x**2, rel=1e-9, abs=0.0)
+
+
 class OnSpring(Model):
     """A mass on a spring, m s'' = -c s."""
 

@@ -4,7 +4,7 @@ Positions first, then velocities, then accelerations and forces: a joint solve o
 positions that are already consistent. Values with a start move a hundred times less gladly than others.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
@@ -18,6 +18,7 @@ from gantrytau.language.piecewise import switched, with_modes
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
 SOLVED = 1e-9  # the same, for an equation to hold
+POLISHED = 3  # times that steps relative to each unknown follow, where rounding of the largest is left
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
 SPREAD = 0.3  # of the first of them
 MOST_PIECES = 60  # that are tried
@@ -162,8 +163,8 @@ def _solve(
     moving = [n for n in moving if n in place]
     columns = [place[n] for n in moving]
     around = np.array([values[n] for n in level.leaves])
-    weights = np.array([STIFFNESS if n in started else 1.0 for n in moving])
-
+    given = np.array([n in started for n in moving], dtype=bool)
+    weights = np.where(given, STIFFNESS, 1.0)
     matrix = level.moving(columns)
 
     def at(point: np.ndarray) -> tuple[np.ndarray, Matrix]:
@@ -176,36 +177,69 @@ def _solve(
         around = propagated(level, around, missing)
     start = around[columns]
 
-    def led(factors: np.ndarray | float, sizes: np.ndarray | float) -> np.ndarray:
+    def led(start: np.ndarray, factors: np.ndarray | float, sizes: np.ndarray | float) -> np.ndarray:
         """Where steps of these sizes lead."""
         return newton(lambda x: _scaled_rows(factors, *at(x)), start, weights * sizes)[0]
 
-    def left_at(point: np.ndarray, sizes: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What is left at a point, which equations do not hold, and which not even but for rounding."""
+    def left_at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray, Matrix]:
+        """Residuals at a point, which equations do not hold, and the derivatives."""
         f, jacobian = at(point)
         off = ~(np.abs(f) <= SOLVED * (abs(jacobian) @ np.abs(point)))
         left = np.flatnonzero(off)
         if left.size and np.all(np.isfinite(f)):
-            off[left] = np.abs(f[left]) > SOLVED * level.sizes(left.tolist(), around)
-        # unknowns that are solved together have the rounding of the largest, in their sizes
-        rounding = abs(scaled(jacobian, 1.0, sizes)).sum(axis=1) * np.max(np.abs(point / sizes), initial=1.0)
-        return f, off, off & ~(np.abs(f) <= ROUNDING * rounding)
+            off[left] = ~(np.abs(f[left]) <= SOLVED * level.sizes(left.tolist(), around))
+        return f, off, jacobian
 
-    point = led(1.0, 1.0)  # sizes of metres, radians and newtons
-    f, off, bad = left_at(point, 1.0)
-    if np.any(off):
+    def settled(point: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return _without_rounding(left_at, led, np.where(given, start, 0.0), point, sizes)
+
+    point, f, bad = settled(led(start, 1.0, 1.0), np.ones(len(start)))  # sizes of metres, radians and newtons
+    if np.any(bad):
         jacobian = at(start)[1]
         rows, sizes = balance(jacobian, matrix(level.certainty(around)))
         if np.any(rows != 1) or np.any(sizes != 1):
-            other = led(rows, sizes)
-            f_other, off, bad_other = left_at(other, sizes)
-            # where both hold but for rounding, the point where less is left
-            less = np.linalg.norm(rows.ravel() * f_other) <= np.linalg.norm(rows.ravel() * f)
-            if np.any(bad) or not np.any(off) or (less and not np.any(bad_other)):
-                point, f, bad = other, f_other, bad_other
+            point, f, bad = settled(led(start, rows, sizes), sizes)
     if np.any(bad):
         raise _failure(level, f, bad, title)
     values.update(zip(moving, point.tolist(), strict=True))
+
+
+def _without_rounding(
+    left_at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, Matrix]],
+    led: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    given: np.ndarray,
+    point: np.ndarray,
+    sizes: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The solution next to a point that is right but for rounding, its residuals, and the equations that do not hold.
+
+    Unknowns that are zero have the rounding of larger ones, by which their equations do not hold. given: start values
+    that somebody gave, else 0.
+    """
+    f, off, jacobian = left_at(point)
+    # unknowns that are solved together have the rounding of the largest, in their sizes
+    noise = ROUNDING * sizes * np.max(np.abs(point / sizes), initial=1.0)
+    bad = off & ~(np.abs(f) <= abs(scaled(jacobian, 1.0, noise)).sum(axis=1))
+    if np.any(bad):
+        return point, f, bad
+    for _ in range(POLISHED):
+        if not np.any(off):
+            break
+        zero = (np.abs(point) <= noise) & ((given == 0) | (np.abs(given) > noise))
+        while np.any(zero):
+            zeroed = np.where(zero, 0.0, point)
+            f_zeroed, still, _ = left_at(zeroed)
+            if not np.any(still):
+                return zeroed, f_zeroed, still
+            needed = zero & (abs(jacobian).T @ still.astype(float) > 0)
+            if not np.any(needed):
+                break
+            zero &= ~needed
+        noise = ROUNDING * noise
+        terms = (abs(jacobian) @ np.abs(point))[:, None]
+        point = led(point, 1 / np.where(terms > 0, terms, 1.0), np.maximum(np.abs(point), noise))
+        f, off, jacobian = left_at(point)
+    return point, f, off
 
 
 def _scaled_rows(rows: np.ndarray | float, f: np.ndarray, jacobian: Matrix) -> tuple[np.ndarray, Matrix]:

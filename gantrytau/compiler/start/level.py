@@ -1,6 +1,6 @@
 """Equations that are solved together, with their numbers, derivatives and the sizes of their terms."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -89,21 +89,28 @@ class Level:
 
     def sizes(self, rows: Sequence[int], numbers: np.ndarray) -> np.ndarray:
         """How large the terms of some residuals are, at numbers of the leaves."""
+        key, whole = ("sizes", *rows), ("sizes", *range(len(self.residuals)))
+        if key not in self._made and any(other[0] == "sizes" for other in self._made):
+            return self._sized(whole, numbers)[
+                list(rows)
+            ]  # of all at once, rather than of others again and again
+        return self._sized(key, numbers)
 
+    def _sized(self, key: tuple[Any, ...], numbers: np.ndarray) -> np.ndarray:
         def made() -> ca.Function:
-            terms = ca.vertcat(*term_sizes([self.residuals[i] for i in rows]))
+            terms = ca.vertcat(*term_sizes([self.residuals[i] for i in key[1:]]))
             return ca.Function("sizes", [self.symbolic[0]], [terms])
 
-        return called(self.kept(("sizes", *rows), made), numbers)[0]
+        return called(self.kept(key, made), numbers)[0]
 
-    def kept(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def kept(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """What does not depend on numbers, made at its first use."""
         if key not in self._made:
             self._made[key] = make()
         return self._made[key]
 
     @cached_property
-    def _made(self) -> dict[Hashable, Any]:
+    def _made(self) -> dict[tuple[Any, ...], Any]:
         return {}
 
     def look(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
