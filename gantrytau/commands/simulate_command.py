@@ -86,7 +86,7 @@ def simulate(
         shown = states or [name for name in result.names if name not in dae.parameter_values][:FEW]
         heading = "state" if states else "variable"
         work = result.statistics
-        record |= result_output.record(result) | ({"statistics": asdict(work)} if work else {})
+        record |= result_output.record(result) | {"statistics": asdict(work)}
 
         def told_ends() -> None:
             result_output.print_ends(chosen.name, result, shown, heading, units)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.compiler.definitions import Definitions
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.compiler.symbol_spaces import Chains, column
+from gantrytau.compiler.symbol_spaces import Chains, column, made_of
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.scalar_arithmetic import depending, negative, plus, times
 from gantrytau.language.statements import Equation
@@ -305,23 +305,11 @@ class _Elimination:
                 stack.append((node.dep(0), factor * float(node.dep(1))))
             elif operator == ca.OP_DIV and node.dep(1).is_constant():
                 stack.append((node.dep(0), factor / float(node.dep(1))))
-            elif self._steady_alone(node):
+            elif made_of(node, self.parameters, LONGEST_SUM):
                 terms.shift(factor, node)
             else:
                 return None
         return None
-
-    def _steady_alone(self, node: ca.SX) -> bool:
-        """Whether an expression is one of parameters alone; of most others the first few symbols tell."""
-        stack = [node]
-        for _ in range(LONGEST_SUM):
-            if not stack:
-                return True
-            one = stack.pop()
-            if one.is_symbolic() and one.name() not in self.parameters:
-                return False
-            stack += [one.dep(k) for k in range(one.n_dep())]
-        return all(leaf.name() in self.parameters for leaf in ca.symvar(node))
 
     def _rooted(self, terms: _Terms) -> _Terms:
         """The same sum in roots and their derivatives."""

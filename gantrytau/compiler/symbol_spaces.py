@@ -12,7 +12,7 @@ root behind it), `System.to_system` from the second to the third. What is solved
 `Substitution`, whatever the last symbols are.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -99,3 +99,16 @@ def values_at(expression: ca.SX, point: Mapping[str, float]) -> np.ndarray:
     rows, columns = expression.sparsity().get_triplet()
     found[rows, columns] = nonzeros
     return found
+
+
+def made_of(expression: ca.SX, names: Collection[str], nodes: int) -> bool:
+    """Whether an expression has no symbols but these; of most that have others the first few nodes tell."""
+    stack = [expression]
+    for _ in range(nodes):
+        if not stack:
+            return True
+        one = stack.pop()
+        if one.is_symbolic() and one.name() not in names:
+            return False
+        stack += [one.dep(k) for k in range(one.n_dep())]
+    return all(leaf.name() in names for leaf in ca.symvar(expression))

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.describing.described import Description
 from gantrytau.results.data_frames import data_frame
 from gantrytau.results.described_result import series_described
@@ -31,11 +32,16 @@ class Result(Series):
         return self.__describe__().html()
 
     @property
-    def statistics(self) -> RunStatistics | None:
-        """What the simulation took: steps, events by condition, seconds, and the states that limit its step; None if this is
-        no result of `simulate`, or one that was read from a file.
+    def statistics(self) -> RunStatistics:
+        """What the simulation took: steps, events by condition, seconds, and the states that limit its step. ModelError if
+        this is no result of `simulate`.
         """
-        return None if self._statistics is None else self._statistics.of(self)
+        if self._statistics is None:
+            raise ModelError(
+                f"{self.title or 'Result'}: found no statistics, expected the result of simulate; those of optima and files "
+                "have none"
+            )
+        return self._statistics.of(self)
 
     def with_statistics(self, found: RunStatistics) -> Self:
         """This result with what its simulation took."""

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 
@@ -23,6 +23,28 @@ FileName = str | os.PathLike[str]
 Shown = Model | type[Model] | Dae
 
 
+@overload
+def view(
+    model: Shown,
+    pose: Mapping[str, Any] | None = None,
+    *,
+    file: FileName | None = None,
+    around: Sequence[Any] = (),
+    sliders: Any = None,
+    configurations: Mapping[str, Mapping[str, Any]] | None = None,
+    live: Literal[False] = False,
+) -> "Page": ...
+@overload
+def view(
+    model: Shown,
+    pose: Mapping[str, Any] | None = None,
+    *,
+    file: FileName | None = None,
+    around: Sequence[Any] = (),
+    sliders: Any = None,
+    configurations: Mapping[str, Mapping[str, Any]] | None = None,
+    live: Literal[True],
+) -> "LivePage": ...
 @shows_progress
 def view(
     model: Shown,

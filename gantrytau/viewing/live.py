@@ -90,7 +90,8 @@ class LivePage:
     def _build(self) -> None:
         """Put the sliders, the choice of assemblies and what is said on the page."""
         gui = self._server.gui
-        gui.configure_theme(control_layout="fixed", show_logo=False, show_share_button=False)
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
         gui.set_panel_label(self._posing.dae.name)
         self._handles = {}
         for name, one in self._told.items():

@@ -1,5 +1,7 @@
 """What is said of wrong Modelica text: line, column, found and expected."""
 
+from typing import Any
+
 import pytest
 
 import gantrytau
@@ -124,13 +126,14 @@ def test_what_is_no_path_another_encoding_and_a_folder_without_its_package_are_r
     (tmp_path / "Lib").mkdir()
     (tmp_path / "Lib" / "A.mo").write_text("model A end A;")
     (tmp_path / "use.mo").write_text("model M\n  Lib.A a;\nend M;")
+    three: Any = 3
     for given, words in (
-        (3, "found 3, expected the path"),
+        (three, "found 3, expected the path"),
         (tmp_path / "wide.mo", "in UTF-16, .*iconv -f utf-16"),
     ):
         with pytest.raises(ModelError, match=words):
             load_modelica(given)
     with pytest.raises(ModelError, match="found 3, expected the path"):
-        load_modelica(tmp_path / "use.mo", libraries=3)
+        load_modelica(tmp_path / "use.mo", libraries=three)
     with pytest.raises(ModelError, match="Lib: found a folder without package"):
         gantrytau.flatten(load_modelica(tmp_path / "use.mo", libraries=[tmp_path])["M"]())

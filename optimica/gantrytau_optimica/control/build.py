@@ -61,20 +61,7 @@ def build(
     constraints = (*read.constraints, *(c for _, more in conditions for c in more))
     limits = (*constraints, *_declared_limits(dae))
 
-    said = (
-        [e for c in limits for e in (c.expression, c.lower, c.upper)],
-        [p.expression for p in points],
-        [p.time for p in points if not isinstance(p.time, str)],
-        [read.objective, *(t.expression for t in read.targets)],
-        [e for stage in read.phases for e in (stage.integrand, stage.start_time, stage.final_time)],
-    )
-    reduced = together(dae.to_reduced, [ca.SX(e) for part in said for e in part])
-    resolved = iter(with_values(system.to_system(reduced), read, numbers))
-    rows, values, moments, (objective, *targets), stages = (
-        list(islice(resolved, len(part))) for part in said
-    )
-    moving = iter(moments)
-    times = [p.time if isinstance(p.time, str) else next(moving) for p in points]
+    rows, values, times, (objective, *targets), stages = _resolved(read, system, numbers, limits, points)
     split = _split(read, system, numbers, dict(controls or {}), rates)
     phases = []
     for k, (integrand, start_time, final_time) in enumerate(zip(*[iter(stages)] * 3, strict=True)):
@@ -104,6 +91,31 @@ def build(
     built = Built(read, draft, system, numbers, points, constraints, closed, causality)
     built = at_pace(without_constants(built, guess), guess)
     return replace(built, problem=with_margins(with_sizes(with_guesses(built, guess))))
+
+
+def _resolved(
+    read: SymbolicProblem,
+    system: System,
+    numbers: Mapping[str, float],
+    limits: Sequence[Any],
+    points: Sequence[Any],
+) -> tuple[list[ca.SX], list[ca.SX], list[Any], list[ca.SX], list[ca.SX]]:
+    """In symbols of the system: expressions and bounds of limits, values and times of points, objective and targets, and
+    integrand, start and final time of each phase.
+    """
+    said = (
+        [e for c in limits for e in (c.expression, c.lower, c.upper)],
+        [p.expression for p in points],
+        [p.time for p in points if not isinstance(p.time, str)],
+        [read.objective, *(t.expression for t in read.targets)],
+        [e for stage in read.phases for e in (stage.integrand, stage.start_time, stage.final_time)],
+    )
+    reduced = together(read.dae.to_reduced, [ca.SX(e) for part in said for e in part])
+    resolved = iter(with_values(system.to_system(reduced), read, numbers))
+    rows, values, moments, costs, stages = (list(islice(resolved, len(part))) for part in said)
+    moving = iter(moments)
+    times = [p.time if isinstance(p.time, str) else next(moving) for p in points]
+    return rows, values, times, costs, stages
 
 
 def _split(

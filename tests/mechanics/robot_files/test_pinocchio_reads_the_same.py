@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pinocchio
+import pinocchio  # pyright: ignore[reportMissingImports]
 import pytest
 
 from gantrytau import translate
