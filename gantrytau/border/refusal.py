@@ -158,8 +158,8 @@ def did_you_mean(wrong: str, names: Iterable[str], describe=None) -> str:
     if close:
         words = describe(close[0]) if describe else ""
         return f"; did you mean '{close[0]}'{f' ({words})' if words else ''}?"
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    return f"; there is {shown}." if names else "."
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else ".")
+    return f"; there is {shown}" if names else "."
 
 
 def meant(wrong: str, words: Iterable[str]) -> str:

@@ -105,6 +105,9 @@ def simulate(
 def _of_experiment(said: Mapping[str, float], start: float) -> tuple[float, float]:
     """Begin and end of a run as the model says them; ModelError where it does not."""
     start = start or said.get("StartTime", 0.0)
+    if "StopTime" not in said:
+        words = "expected the time in s at which to stop, as the model has no experiment with a StopTime"
+        raise ModelError(words, place="simulate", found=Given("stop", None))
     return start, number("simulate", "stop", said.get("StopTime"), unit="s", above=start)
 
 

@@ -12,7 +12,8 @@ ModelName = Annotated[
     typer.Argument(
         metavar="MODEL",
         help="A model of the library (`gantrytau library` lists them), as Pendulum or 'GantryTau(D1)', "
-        "or a class in a file of yours, as robot.py:Robot or robot.mo:Package.Model.",
+        "or a class in a file of yours, as robot.py:Robot or robot.mo:Package.Model, "
+        "or a robot.urdf, .xml of MuJoCo or .sdf.",
         autocompletion=shell_offers.models,
         show_default=False,
     ),

@@ -304,9 +304,9 @@ class ClassScope:
         for item in self._imports:
             package, _, last = item.name.rpartition(".")
             if item.names is not None and (name in item.names or item.names == ("*",)):
-                yield self.root.find_class(item.name, item.at), name, item
+                yield self.find_class(f".{item.name}", item.at), name, item
             elif item.names is None and name == (item.alias or last):
-                yield self.root.find_class(package, item.at) if package else self.root, last, item
+                yield self.find_class(f".{package}", item.at) if package else self.root, last, item
 
     def imported(self, name: str) -> "ClassScope | None":
         """The class that an import makes of a name."""
@@ -365,14 +365,15 @@ class ClassScope:
         first, *rest = [name] if self.source.base and self.first(name) else name.split(".")
         start = self.root if first == "" else self
         if first == "":
-            first, *rest = rest
+            name, first, *rest = name[1:], *rest
         found = start.first(first, inherited)
         if found is None:
             near = start.known_names()
             hint = did_you_mean(first, near) if near else "."
             self.refuse(
                 at,
-                f"found '{name}', expected the name of a class{hint} A library is given by its folder, libraries=",
+                f"found '{name}', expected the name of a class{hint} A library is given by its folder: "
+                "libraries=[...], --library",
             )
         for part in rest:
             inner = found.inherited_class(part)
