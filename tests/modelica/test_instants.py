@@ -161,3 +161,19 @@ def test_what_a_when_sets_starts_from_variables(tmp_path, start):
     found = simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=1.0)
     np.testing.assert_allclose(found.at(np.array([0.2, 0.8]), "h"), [6, 7], rtol=1e-9)
     np.testing.assert_allclose(found.at(np.array([0.2, 0.8]), "j"), [4, 5], rtol=1e-9)
+
+
+def test_an_enumeration_that_varies_has_a_number_and_sizes_an_array(tmp_path):
+    (tmp_path / "p.mo").write_text(
+        """package P
+          type Gear = enumeration(low, high);
+          model M
+            Gear gear(start=Gear.low, fixed=true);
+            Real ratios[Gear] = {3, 1}, number = Integer(gear), last = ratios[Gear.high];
+          equation
+            when time > 0.5 then gear = Gear.high; end when;
+          end M;
+        end P;"""
+    )
+    found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
+    assert [*found.at(np.array([0.2, 0.8]), "number"), *found.at(np.array([0.2]), "last")] == [1, 2, 1]
