@@ -144,3 +144,36 @@ def test_initial_algorithms_and_whens_with_initial_act_at_the_start(tmp_path):
     np.testing.assert_allclose(
         begun, [1, 0.25, 1, 2, 0.5, 2, 4, 1.0, 2], atol=1e-7
     )  # of the instants' location
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "initial equation x = t; t = 2; h = 3 * x; j = if x > 1 then 4 else 5;",
+        "initial equation x = t; t = 2; pre(h) = 3 * t; pre(j) = if x > 1 then 4 else 5;",
+        "initial algorithm t := 2; x := t; h := 3 * x; j := if x > 1 then 4 else 5;",
+    ],
+)
+def test_what_a_when_sets_starts_from_variables(tmp_path, start):
+    declared = "parameter Real t(fixed=false); Real x; discrete Real h; Integer j;"
+    acts = "when time > 0.5 then h = pre(h) + 1; j = pre(j) + 1; end when;"
+    (tmp_path / "m.mo").write_text(f"model M {declared} {start} equation der(x) = -x; {acts} end M;")
+    found = simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=1.0)
+    np.testing.assert_allclose(found.at(np.array([0.2, 0.8]), "h"), [6, 7], rtol=1e-9)
+    np.testing.assert_allclose(found.at(np.array([0.2, 0.8]), "j"), [4, 5], rtol=1e-9)
+
+
+def test_an_enumeration_that_varies_has_a_number_and_sizes_an_array(tmp_path):
+    (tmp_path / "p.mo").write_text(
+        """package P
+          type Gear = enumeration(low, high);
+          model M
+            Gear gear(start=Gear.low, fixed=true);
+            Real ratios[Gear] = {3, 1}, number = Integer(gear), last = ratios[Gear.high];
+          equation
+            when time > 0.5 then gear = Gear.high; end when;
+          end M;
+        end P;"""
+    )
+    found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
+    assert [*found.at(np.array([0.2, 0.8]), "number"), *found.at(np.array([0.2]), "last")] == [1, 2, 1]

@@ -279,3 +279,20 @@ def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
     )
     levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"](), stop=1.0, tolerance=1e-10)
     np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)
+
+
+def test_a_constraint_of_a_class_modifies_what_replaces_it(tmp_path):
+    (tmp_path / "p.mo").write_text(
+        """package P
+          model A parameter Real k = 1, y = 10 * k; end A;
+          model B extends A(k = 5); parameter Real more = 7; end B;
+          model H replaceable model X = A constrainedby A(k = 2); X x; end H;
+          model M
+            H plain, over(x(k = 3));
+            H other(redeclare model X = B), own(redeclare model X = B(k = 4));
+          end M;
+        end P;"""
+    )
+    found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
+    values = [found.at(np.array([1.0]), f"{name}.x.y")[0] for name in ("plain", "over", "other", "own")]
+    assert values == [20, 30, 20, 40]

@@ -57,6 +57,11 @@ WRONG = (  # text of a model, line and column, words
 FUNCTION = "function f\n  input Real u[2];\n  output Integer n = integer(u[1]);\nend f;\n"
 MEANINGS = (  # where a wrong model would run: text, line and column, words
     (
+        "model M\n  Real x = Integer(time);\nend M;",
+        "2:12",
+        "found Real in Integer\\(\\), expected a value of an",
+    ),
+    (
         "model A\n  parameter Real p;\nend A;\nmodel M\n  A a[2](p={1, 2, 3});\nend M;",
         "5:10",
         "found 3 values for",

@@ -1,6 +1,6 @@
 """Functions and algorithms, carried out on values and on expressions of symbols alike (Modelica 3.6, chapters 11 and 12)."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -194,12 +194,16 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
     return found
 
 
-def stated_by_algorithm(items: Items, reader: Interpreter) -> Iterator[Any]:
-    """The equations that an algorithm of a model amounts to: one for each variable that it assigns."""
+def stated_by_algorithm(
+    items: Items, reader: Interpreter, wanted: Collection[str] | None = None
+) -> Iterator[Any]:
+    """The equations that an algorithm of a model amounts to: one for each variable that it assigns, or each wanted one."""
     names = dict.fromkeys(assigned(items))
     run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
     run.run(items)
     for name, value in run.known.items():
+        if wanted is not None and name not in wanted:
+            continue
         left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
         if right is None:
             raise ModelError(

@@ -183,7 +183,7 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
-            if name in held and isinstance(item, tree.SimpleEquation):
+            if name in held and isinstance(item, tree.SimpleEquation) and structure.is_fixed(item.right):
                 structure.started.append(item)
                 yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
@@ -307,15 +307,23 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
     """The statements of the sections that hold at all times, or at the start."""
     structure: Structure = type(instance).structure
     held, firsts = set(_held(structure)), []
-    for section in sorted(_all_sections(structure), key=lambda one: one.kind != "initial algorithm"):
-        sets_held = section.kind == "initial algorithm" and held.issuperset(assigned(section.items))
-        if section.kind == "constraint" or (section.kind.startswith("initial") and not sets_held) != initial:
-            continue
-        read = stated_by_algorithm if section.kind.endswith("algorithm") else stated
+    for section in sorted(_all_sections(structure), key=lambda one: not one.kind.startswith("initial")):
+        starts, steps = section.kind.startswith("initial"), section.kind.endswith("algorithm")
         items = [one for one in section.items if not any(one is other for other in structure.started)]
+        if starts and not steps:
+            items = (
+                [i for i in items if first_valued(i) not in held] if initial else _set_by_whens(items, held)
+            )
+        if section.kind == "constraint" or (initial and not starts) or not items:
+            continue
+        reader = structure.interpreter(section.scope, PlacedMembers(instance))
         try:
-            found = read(items, structure.interpreter(section.scope, PlacedMembers(instance)))
-            if sets_held:
+            if starts and (steps or not initial):
+                named = set(assigned(items)) - held if initial else held.intersection(assigned(items))
+                found = stated_by_algorithm(items, reader, named) if named else ()
+            else:
+                found = (stated_by_algorithm if steps else stated)(items, reader)
+            if starts and not initial:
                 firsts += found
             else:
                 yield from (_begun(one, firsts) for one in found)
@@ -323,8 +331,18 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None
 
 
+def _set_by_whens(items: Iterable[Any], held: Collection[str]) -> list[tree.Assignment]:
+    """The initial equations of what a `when` sets, as assignments."""
+    found = (
+        (one, tree.ComponentReference(one.at, ((name, ()),)))
+        for one in items
+        if (name := first_valued(one)) in held
+    )
+    return [tree.Assignment(one.at, None, None, False, (left,), one.right) for one, left in found]
+
+
 def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
-    """A statement; a chain of `when` also gives what it sets the values of initial algorithms."""
+    """A statement; a chain of `when` also gives what it sets the values of initial sections."""
     if not isinstance(stated, WhenChain) or not firsts:
         return stated
     actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]

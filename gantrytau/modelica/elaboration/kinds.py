@@ -59,6 +59,7 @@ def type_of(e: Any, reader: Interpreter) -> str:
 
 
 NUMBERS = ("Real", "Integer")
+NOT_ENUMERATED = ("Real", "Boolean", "String")
 
 
 def _type_of_binary(e: tree.Binary, reader: Interpreter) -> str:
@@ -106,6 +107,8 @@ def _type_of_reference(e: tree.ComponentReference, reader: Interpreter) -> str:
 
 def _type_of_call(e: tree.Call, reader: Interpreter) -> str:
     name, function = reader.function(e)
+    if name == "Integer" and e.arguments and (found := type_of(e.arguments[0], reader)) in NOT_ENUMERATED:
+        reader.scope.refuse(e.at, f"found {found} in Integer(), expected a value of an enumeration")
     if name in BOOLEANS | INTEGERS or name == "String":
         return "Boolean" if name in BOOLEANS else "String" if name == "String" else "Integer"
     if name in OF_ARGUMENT and len(e.arguments) > OF_ARGUMENT[name]:

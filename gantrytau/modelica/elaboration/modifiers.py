@@ -123,6 +123,14 @@ def read_arguments(arguments: tuple[tree.AnyArgument, ...] | None, scope: Any) -
     return Modifier(inner=inner, scope=scope)
 
 
+def read_constraint(*classes: Any) -> Modifier:
+    """The modifications in the `constrainedby` of the first class that has one; None among the classes is passed over."""
+    for one in classes:
+        if one is not None and one.definition.constraint is not None:
+            return read_arguments(one.definition.constraint.arguments, one.around)
+    return NOTHING
+
+
 def _redeclaration(one: tree.Redeclaration, scope: Any) -> tuple[str, Modifier]:
     element = one.element
     whole = Redeclared(element, scope)

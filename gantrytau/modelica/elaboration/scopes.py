@@ -7,6 +7,7 @@ from typing import NoReturn
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import modifiers
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
 from gantrytau.modelica.optimizations import HORIZON
 from gantrytau.modelica.source import SourceText
@@ -49,7 +50,8 @@ class StatementSection:
 class ClassScope:
     """A class as a place of names. around: the class in which it stands; replaced: its redeclared classes by name.
 
-    more: what a folder adds to a package, as a function of a name; predefined: whether it is of the language, as Real.
+    more: what a folder adds to a package, as a function of a name; predefined: whether it is of the language, as Real;
+    limit: the class that it replaces, whose constraint modifies it where it has none of its own.
     """
 
     definition: tree.ClassDefinition
@@ -58,7 +60,8 @@ class ClassScope:
     replaced: Mapping[str, "ClassScope"] = field(default_factory=dict)
     more: Callable[[str], "ClassScope | None"] | None = None
     predefined: bool = False
-    busy: bool = False
+    limit: "ClassScope | None" = None
+    busy: bool = field(default=False, init=False)
 
     def refuse(self, at: int, words: str) -> NoReturn:
         """TextError with the line of an offset."""
@@ -104,7 +107,8 @@ class ClassScope:
             for i in self.items
             if isinstance(i, tree.ClassDefinition)
         }
-        return found | {name: new for name, new in self.replaced.items() if name in found}
+        new = self.replaced
+        return found | {name: replace(new[name], limit=old) for name, old in found.items() if name in new}
 
     @cached_property
     def declared(self) -> dict[str, Element]:
@@ -156,7 +160,8 @@ class ClassScope:
     ) -> tuple["ClassScope", Modifier]:
         start = self.around if isinstance(self.definition.body, tree.ShortClass) and self.around else self
         base = start.find_class(name, at, inherited=False)
-        modifier = read_arguments(arguments, start)
+        limits = (self, self.limit) if isinstance(self.definition.body, tree.ShortClass) else ()
+        modifier = merged(read_arguments(arguments, start), modifiers.read_constraint(*limits))
         own = {n: one for n, one in self.classes.items() if "redeclare" in one.definition.prefixes}
         return base.redeclared(modifier).with_replaced({**own, **self.replaced}), modifier
 
@@ -164,7 +169,7 @@ class ClassScope:
         """The class with others in the place of those that it holds or inherits under these names."""
         if not classes:
             return self
-        return ClassScope(self.definition, self.source, self.around, {**self.replaced, **classes}, self.more)
+        return replace(self, replaced={**self.replaced, **classes})
 
     def redeclared(self, modifier: Modifier) -> "ClassScope":
         """The class as a modification that redeclares classes in it makes it."""
@@ -213,10 +218,7 @@ class ClassScope:
     def elements(self) -> dict[str, Element]:
         """All components in the order of their declarations, inherited ones with their modifications."""
         found: dict[str, Element] = {}
-        hidden = [isinstance(item, tree.Extends) and protected for item, protected in self._items]
-        hidden = [
-            h for h, (item, _) in zip(hidden, self._items, strict=True) if isinstance(item, tree.Extends)
-        ]
+        hidden = [protected for item, protected in self._items if isinstance(item, tree.Extends)]
         for k, (base, modifier) in enumerate(self.bases):
             for name, element in base.elements.items():
                 over = modifier.inner.get(name)

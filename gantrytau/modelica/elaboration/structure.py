@@ -341,6 +341,8 @@ class ClassMember:
             self.owner.read.intersection_update(before)
             return found[dimension]
         found = self.owner.interpreter(scope).value(size)
+        if isinstance(found, np.ndarray) and found.size and isinstance(found.flat[0], EnumerationValue):
+            return found.size  # an enumeration
         if isinstance(found, bool) or not isinstance(found, int) or found < 0:
             scope.refuse(
                 size.at,

@@ -335,7 +335,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "smooth": lambda _, value: value,
     "noEvent": lambda value: value,
     "semiLinear": lambda x, above, below: if_else(x >= 0, above * x, below * x),
-    "Integer": int,
+    "Integer": lambda value: value if isinstance(value, ca.SX) else int(value),
     "String": _written,
 }  # fmt: skip
 REFUSED: Mapping[str, str] = {
