@@ -242,14 +242,16 @@ def _in_robot_file(file: Path, kind: Kind) -> type[Model]:
 def _in_text(file: Path, name: str, kind: Kind) -> Any:
     """The class of a file of Modelica or Optimica; without a name, the only one in it of the kind."""
     library = _text_loader(file)(file)
-    wanted = ("optimization",) if kind is PROBLEM else ("model", "block")
-    models = [one for one in library.names if library.kind_of(one) in wanted]
-    if not name and len(models) != 1:
-        what = f"several {kind.word}s ({', '.join(models)})" if models else f"no {kind.word}"
-        raise CommandError(
-            f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), kind.word.title())}"
-        )
-    return _checked(library[name or models[0]], f"{file.name}:{name}", kind)
+    if not name:
+        wanted = ("optimization",) if kind is PROBLEM else ("model", "block")
+        models = [one for one in library.names if library.kind_of(one) in wanted]
+        if len(models) != 1:
+            what = f"several {kind.word}s ({', '.join(models)})" if models else f"no {kind.word}"
+            raise CommandError(
+                f"{file.name} holds {what}; name one, as {file.name}:{next(iter(models), kind.word.title())}"
+            )
+        (name,) = models
+    return _checked(library[name], f"{file.name}:{name}", kind)
 
 
 def _text_loader(file: Path) -> Callable[..., ModelicaLibrary]:

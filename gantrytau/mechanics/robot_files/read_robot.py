@@ -12,7 +12,7 @@ from gantrytau.mechanics.robot_files.robot_class import DescribedRobot, robot_cl
 from gantrytau.mechanics.robot_files.robot_description import RobotDescription
 from gantrytau.mechanics.robot_files.sdf_file import read_sdf_file
 from gantrytau.mechanics.robot_files.urdf_file import read_urdf_file
-from gantrytau.mechanics.robot_files.visual_shapes import MeshFolders
+from gantrytau.mechanics.robot_files.visual_shapes import MeshFolders, missing_meshes
 
 File = str | os.PathLike[str]
 Folders = Mapping[str, File] | None
@@ -76,6 +76,12 @@ def read_sdf(file: File, *, packages: Folders = None, driven: Names = None) -> t
 
 def _made(robot: RobotDescription, packages: Folders, driven: Names, reader: str) -> type[DescribedRobot]:
     """The class of a robot; its drives are those that are asked for."""
+    for name, folder in (packages or {}).items():
+        if not os.path.isdir(folder):
+            raise ModelError(
+                f"{reader}: found no folder {os.fspath(folder)} for the package {name}, expected one that is there",
+                argument="packages",
+            )
     if driven is not None:
         if isinstance(driven, str) or not set(driven) <= set(robot.moving):
             raise ModelError(
@@ -83,4 +89,6 @@ def _made(robot: RobotDescription, packages: Folders, driven: Names, reader: str
                 argument="driven",
             )
         robot = replace(robot, driven=tuple(driven))
-    return robot_class(robot, MeshFolders(robot.file, packages or {}))
+    folders = MeshFolders(robot.file, packages or {})
+    lost = missing_meshes(robot.links, folders)
+    return robot_class(replace(robot, left_out=(*robot.left_out, *lost)), folders)

@@ -1,7 +1,7 @@
 """<visual>s of links as shapes, and where their meshes are."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,14 @@ class MeshFolders:
             if folder.name == package:
                 yield folder / rest
             yield folder / package / rest
+
+
+def missing_meshes(links: Iterable[RobotLink], folders: MeshFolders) -> Iterator[str]:
+    """What is not drawn, as its file cannot be found or read."""
+    for link in links:
+        for visual in link.visuals:
+            if visual.file and folders.find(visual.file) is None:
+                yield f"link {link.name}: mesh {visual.file}, not found"
 
 
 def shapes_of_link(link: RobotLink, folders: MeshFolders) -> tuple[Shape, ...]:

@@ -1,6 +1,7 @@
 """`load_modelica`: files and folders of Modelica text as classes of the language."""
 
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -50,6 +51,7 @@ class ModelicaLibrary:
         self.given: list[str] = []
         self._packages: dict[int, Structure] = {}
         self._classes: dict[str, type[Any]] = {}
+        self._read: set[Path] = set()
         for path in paths:
             self.given += self._add(path)
         self.root.more = lambda name: _in_folders(libraries, name, self.root)
@@ -64,6 +66,10 @@ class ModelicaLibrary:
                     place=str(path),
                 )
             return [name for file in files for name in self._add(file)]
+        path = _package_of(path)
+        if path in self._read:
+            return []
+        self._read.add(path)
         found = [package_in(path, self.root)] if path.is_dir() else _in_file(path, self.root)
         for one in found:
             around = self.root if one.source.base else one.around or self.root
@@ -77,6 +83,7 @@ class ModelicaLibrary:
         """Full names of the models, blocks, connectors and records in the given files."""
         left = [*map(self._found, self.given)]
         for one in left:
+            _read_all(one)
             left += [inner for inner in one.classes.values() if inner.around is one]
         return tuple(sorted(one.name for one in left if one.definition.kind in self.kinds))
 
@@ -172,6 +179,16 @@ def _path(given: Any, example: str) -> Path:
     return Path(given)
 
 
+def _package_of(path: Path) -> Path:
+    """The folder of the outermost package of which a file or folder is a part, or itself."""
+    inside = path.name == "package.mo" or path.is_dir()
+    if not inside and path.is_file():
+        inside = re.search(rb"^\s*within\s+[A-Za-z]", path.read_bytes(), re.MULTILINE) is not None
+    while inside and (path.resolve().parent / "package.mo").is_file():
+        path = path.resolve().parent
+    return path
+
+
 def _empty_package(name: str) -> tree.ClassDefinition:
     body = tree.Composition(0, False, None, (), None)
     return tree.ClassDefinition(0, None, None, (), "package", name, body, None)
@@ -215,6 +232,15 @@ def package_in(folder: Path, around: ClassScope) -> ClassScope:
     made = ClassScope(definition, found.source, around)
     made.more = lambda name: _in_folder(folder, name, made) or _renamed(made, name)
     return made
+
+
+def _read_all(package: ClassScope) -> None:
+    """Read the classes of a package that stand in files of their own."""
+    file = Path(package.source.name)
+    if file.name == "package.mo" and package.definition.name == file.parent.name.partition(" ")[0]:
+        for place in sorted(file.parent.iterdir()):
+            if place.suffix == ".mo" or (place / "package.mo").is_file():
+                package.own_class(place.stem if place.suffix == ".mo" else place.name)
 
 
 def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None:
