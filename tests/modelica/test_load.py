@@ -240,6 +240,15 @@ def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):
     (tmp_path / "use.mo").write_text("model Use\n extends Lib.Parts.Lag(x(start=2));\nend Use;")
     use = load_modelica(tmp_path / "use.mo", libraries=[tmp_path])["Use"]
     assert simulate(use(), stop=1.0)["x"][-1] == pytest.approx(2 * np.exp(-3), rel=1e-7)
+    for part in (
+        "Parts/Lag.mo",
+        "Parts/package.mo",
+        "Parts",
+        "package.mo",
+        ".",
+    ):  # each brings the whole package
+        library = load_modelica(tmp_path / "Lib" / part, tmp_path / "Lib" / "Parts" / "Lag.mo")
+        assert library.names == ("Lib.Parts.Lag",)
 
 
 class Controlled(Model):

@@ -27,6 +27,7 @@ from gantrytau.commands.printing.reporting import CommandError, note, refusing
 from gantrytau_models import prototypes
 
 FIRST_PROTOTYPE = "L1"
+TOLD = 5  # parts of a file that the model has not
 ROBOT_FILES = (".urdf", ".mjcf", ".xml", ".sdf")
 TEXT = (".mo", ".mop")  # files of Modelica and of Optimica
 
@@ -233,10 +234,15 @@ def _in_robot_file(file: Path, kind: Kind) -> type[Model]:
 
     if kind is not MODEL:
         raise CommandError(f"{file.name} is a robot, expected {kind}")
-    if file.suffix.lower() != ".urdf":
-        return read_sdf(file) if file.suffix.lower() == ".sdf" else read_mjcf(file)
     loops = file.with_suffix(".loops.toml")
-    return read_urdf(file, loops if loops.is_file() else None)
+    if file.suffix.lower() == ".urdf":
+        robot = read_urdf(file, loops if loops.is_file() else None)
+    else:
+        robot = read_sdf(file) if file.suffix.lower() == ".sdf" else read_mjcf(file)
+    if robot.left_out:
+        rest = f", and {len(robot.left_out) - TOLD} more" if len(robot.left_out) > TOLD else ""
+        note(f"{file.name}: left out: {', '.join(robot.left_out[:TOLD])}{rest}")
+    return robot
 
 
 def _in_text(file: Path, name: str, kind: Kind) -> Any:

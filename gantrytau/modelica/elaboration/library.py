@@ -1,5 +1,6 @@
 """`load_modelica`: files and folders of Modelica text as classes of the language."""
 
+import contextlib
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -240,7 +241,8 @@ def _read_all(package: ClassScope) -> None:
     if file.name == "package.mo" and package.definition.name == file.parent.name.partition(" ")[0]:
         for place in sorted(file.parent.iterdir()):
             if place.suffix == ".mo" or (place / "package.mo").is_file():
-                package.own_class(place.stem if place.suffix == ".mo" else place.name)
+                with contextlib.suppress(ModelError):  # told where the class is asked for
+                    package.own_class(place.stem if place.suffix == ".mo" else place.name)
 
 
 def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None:

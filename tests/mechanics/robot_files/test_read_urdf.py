@@ -262,7 +262,11 @@ def test_links_are_seen_as_their_visuals(tmp_path):
     ):
         seen += f'<visual><geometry><mesh filename="{mesh}" scale="0.001 0.001 0.001"/></geometry></visual>'
     body = '<link name="base"/>' + link("arm", 1.0, seen) + joint("q", "fixed", "base", "arm")
-    film = film_of(Result([0.0], {}, shapes=flatten(read(tmp_path, body)()).shapes), model=None, around=())
+    arm = read(tmp_path, body)
+    assert arm.left_out == ("link arm: mesh package://lost/arm.stl, not found",)
+    with pytest.raises(ModelError, match=r"no folder .* for the package lost"):
+        read_urdf(tmp_path / "robot.urdf", packages={"lost": tmp_path / "nowhere"})
+    film = film_of(Result([0.0], {}, shapes=flatten(arm()).shapes), model=None, around=())
     seen_of_arm: list[Any] = [shape for shape in film.shapes if shape.owner == "arm"]
     box, cylinder, sphere, *meshes = seen_of_arm
     assert [type(shape).__name__ for shape in seen_of_arm] == [
