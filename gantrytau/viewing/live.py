@@ -51,11 +51,14 @@ class LivePage:
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Move sliders to values, within their ranges. Raises ModelError for other names."""
+        found: dict[str, float] = {}
         for name, value in values.items():
             if name not in self._handles:
                 raise ModelError(f"view: found no slider {name}{did_you_mean(name, self._handles)}")
-            handle, own = self._handles[name], self._posing.dae.flat.unit(name)
-            shown = self._scale(name).written(float(given(f"view: {name}", value, own)))
+            own = self._posing.dae.flat.unit(name)
+            found[name] = self._scale(name).written(float(given(f"view: {name}", value, own)))
+        for name, shown in found.items():
+            handle = self._handles[name]
             handle.value = float(np.clip(shown, handle.min, handle.max))
         self._move()
 

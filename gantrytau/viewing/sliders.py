@@ -178,7 +178,7 @@ class Posing:
                     name=slider.name,
                     unit=unit,
                     words=words.get(slider.name, ""),
-                    values=[float(f"{x:.6g}") for x in values],
+                    values=values.tolist(),
                     start=slider.start,
                 )
             )
@@ -216,8 +216,11 @@ def poses_page(posing: Posing) -> str:
             words, place="view", found=Given("sliders", [slider.name for slider in posing.sliders])
         )
     poses = posing.everywhere()
+    shown = posing.shown()
+    for one in shown:
+        one["values"] = [float(f"{x:.6g}") for x in one["values"]]
     data = dict(
-        sliders=posing.shown(),
+        sliders=shown,
         assemblies=poses.assemblies,
         failed=np.flatnonzero(poses.failed).tolist(),
         reasons=poses.reasons,
@@ -275,4 +278,8 @@ def _range(dae: Dae, name: str, own: float) -> tuple[float, float]:
     """The limits of a declaration; for want of them some way about the start, for a parameter half of it."""
     told = {side: dae.number(limit) for other, side, _, limit in limited(dae.flat) if other == name}
     way = abs(own) / 2 if name in dae.parameter_values else COORDINATES.get(str(dae.flat.unit(name)), 0.5)
-    return told.get("min", own - (way or 0.5)), told.get("max", own + (way or 0.5))
+    way = way or 0.5
+    low, high = told.get("min", own - way), told.get("max", own + way)
+    if low < high:
+        return low, high
+    return (low, low + 2 * way) if "min" in told else (high - 2 * way, high)  # it starts beyond its limit

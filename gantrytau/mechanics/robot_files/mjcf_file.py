@@ -257,9 +257,8 @@ class _Reader:
         if other is not None:
             xml.known(part, "joint2", other, self.references, "joint")
         words = part.get("polycoef", "0 1 0 0 0")
-        offset, slope, *higher = (
-            xml.read_numbers(part, words, len(words.split()), f'polycoef="{words}"') + (0.0,) * 2
-        )
+        given = xml.read_numbers(part, words, len(words.split()), f'polycoef="{words}"')
+        offset, slope, *higher = (*given, *(0.0, 1.0)[len(given) :])  # what is missing has its default
         if any(higher) and other is not None:
             raise xml.refusal(
                 part, f'polycoef="{words}"', "a line, its first two numbers; no other curve is read"

@@ -364,10 +364,8 @@ class ClassScope:
 
     def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""
+        start, name = (self.root, name[1:]) if name.startswith(".") else (self, name)
         first, *rest = [name] if self.source.base and self.first(name) else name.split(".")
-        start = self.root if first == "" else self
-        if first == "":
-            name, first, *rest = name[1:], *rest
         found = start.first(first, inherited)
         if found is None:
             near = start.known_names()

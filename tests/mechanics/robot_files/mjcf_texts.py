@@ -62,8 +62,8 @@ SLIDER_CRANK = f"""<worldbody>{bar("crank", 0.2, hinge("turn"), bar("rod", 0.5, 
 GEARED = f"""<worldbody>{bar("one", 0.5, hinge("p", 'ref="10"'))}{bar("two", 0.4, hinge("q"), where="0 1 0")}
   {bar("three", 0.3, hinge("r"), where="0 2 0")}
   <body name="rack"><joint name="s" type="slide" axis="1 0 1"/><geom size=".1"/></body>
-  </worldbody><equality><joint joint1="q" joint2="p" polycoef="0.1 -0.5 0 0 0"/>
-  <joint joint1="s" joint2="p" polycoef="0 0.2 0 0 0"/>
+  </worldbody><equality><joint joint1="q" joint2="p" polycoef="0.1"/>
+  <joint joint1="s" joint2="p" polycoef="0 0.2"/>
   <joint joint1="r" polycoef="0.3 0 0 0 0"/></equality>"""
 WELDED = f"""<worldbody><body name="a" euler="0 110 0">{hinge("p")}{BAR.format(0.4)}
   <body name="top" pos="0.4 0 0" euler="0 -110 0">{hinge("q")}{BAR.format(0.5)}</body></body>

@@ -153,7 +153,7 @@ def test_what_is_no_mjcf_is_refused_by_its_place(tmp_path, body, words):
 
 
 def test_a_curve_between_joints_is_refused(tmp_path):
-    file = written(tmp_path, mjcf_texts.GEARED.replace("0 0.2 0 0 0", "0 0.2 1 0 0"))
+    file = written(tmp_path, mjcf_texts.GEARED.replace("0 0.2", "0 0.2 1 0 0"))
     with pytest.raises(ModelError, match="a line, its first two numbers"):
         read_mjcf(file)
 
