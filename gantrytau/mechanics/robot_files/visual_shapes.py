@@ -45,7 +45,7 @@ def missing_meshes(links: Iterable[RobotLink], folders: MeshFolders) -> Iterator
     for link in links:
         for visual in link.visuals:
             if visual.file and folders.find(visual.file) is None:
-                yield f"link {link.name}: mesh {visual.file}, not found"
+                yield f"link {link.name}: mesh {visual.file}, not found or of another format"
 
 
 def shapes_of_link(link: RobotLink, folders: MeshFolders) -> tuple[Shape, ...]:

@@ -263,7 +263,7 @@ def test_links_are_seen_as_their_visuals(tmp_path):
         seen += f'<visual><geometry><mesh filename="{mesh}" scale="0.001 0.001 0.001"/></geometry></visual>'
     body = '<link name="base"/>' + link("arm", 1.0, seen) + joint("q", "fixed", "base", "arm")
     arm = read(tmp_path, body)
-    assert arm.left_out == ("link arm: mesh package://lost/arm.stl, not found",)
+    assert arm.left_out == ("link arm: mesh package://lost/arm.stl, not found or of another format",)
     with pytest.raises(ModelError, match=r"no folder .* for the package lost"):
         read_urdf(tmp_path / "robot.urdf", packages={"lost": tmp_path / "nowhere"})
     film = film_of(Result([0.0], {}, shapes=flatten(arm()).shapes), model=None, around=())
