@@ -18,6 +18,7 @@ from gantrytau.language.piecewise import switched, with_modes
 
 STIFFNESS = 1e-2  # how far a value with a start moves, compared with one without
 SOLVED = 1e-9  # the same, for an equation to hold
+NOTHING = float(np.finfo(float).tiny / np.finfo(float).eps)  # what is smaller loses its digits in products
 POLISHED = 3  # times that steps relative to each unknown follow, where rounding of the largest is left
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
 SPREAD = 0.3  # of the first of them
@@ -184,7 +185,7 @@ def _solve(
     def left_at(point: np.ndarray) -> tuple[np.ndarray, np.ndarray, Matrix]:
         """Residuals at a point, which equations do not hold, and the derivatives."""
         f, jacobian = at(point)
-        off = ~(np.abs(f) <= SOLVED * (abs(jacobian) @ np.abs(point)))
+        off = ~(np.abs(f) <= NOTHING + SOLVED * (abs(jacobian) @ np.abs(point)))
         left = np.flatnonzero(off)
         if left.size and np.all(np.isfinite(f)):
             off[left] = ~(np.abs(f[left]) <= SOLVED * level.sizes(left.tolist(), around))
