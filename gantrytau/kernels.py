@@ -116,7 +116,7 @@ class Kernel:
 
 
 def code_size(function: ca.Function) -> float:
-    """The number of instructions of a function, with the functions it calls; inf if one of them lies in a library."""
+    """The number of instructions of a function and of the functions it calls; inf if a called one lies in a library."""
     if function.class_name() == "External":
         return math.inf
     own = function.n_instructions() if function.is_a("SXFunction") or function.is_a("MXFunction") else 0
@@ -124,7 +124,7 @@ def code_size(function: ca.Function) -> float:
 
 
 def kernel_for(function: ca.Function, calls: float, wait: bool = False) -> Kernel:
-    """The kernel of a function where that pays, if it is there; else a process begins to compile it.
+    """The kernel of a function, if compiling it pays. A missing kernel begins to be compiled in a process of its own.
 
     calls: how often it is expected to be called; wait: whether to wait for a compiler instead of going on without.
     """

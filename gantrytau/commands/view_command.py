@@ -66,18 +66,7 @@ def view(
     It needs the extra `view`; `gantrytau doctor` says whether that is there, and how to get it.
     """
     with reporting(json, source_of(model)):
-        if pose and result:
-            raise CommandError(
-                "found --pose and --result, expected one of them; a motion has poses of its own"
-            )
-        if (slider or live) and result:
-            raise CommandError(
-                f"found {'--slider' if slider else '--live'} and --result, expected one of them; a motion has no sliders"
-            )
-        if live and (output or json):
-            raise CommandError(
-                f"found --live and {'--output' if output else '--json'}, expected one of them; a live page is no file"
-            )
+        _check_together(pose, result, slider, live, output, json)
         writable_place("--output", output, ".html", ".htm")
         page: Any
         motions = [read_result(file, "--result") for file in result or ()]
@@ -100,6 +89,19 @@ def view(
         files = written(output or Path(f"{chosen.name}.html"), page.save)
         record = {**chosen.record("model"), "file": files[0], "bytes": len(page.text.encode())}
         answered(json, record, None, files)
+
+
+def _check_together(pose: Any, result: Any, slider: Any, live: bool, output: Any, json: bool) -> None:
+    """CommandError for two options that exclude each other."""
+    for one, other, first, second, why in (
+        (pose, result, "--pose", "--result", "a motion has poses of its own"),
+        (slider, result, "--slider", "--result", "a motion has no sliders"),
+        (live, result, "--live", "--result", "a motion has no sliders"),
+        (live, output, "--live", "--output", "a live page is no file"),
+        (live, json, "--live", "--json", "a live page is no file"),
+    ):
+        if one and other:
+            raise CommandError(f"found {first} and {second}, expected one of them; {why}")
 
 
 def _range(text: str) -> tuple[str, tuple[str, str] | None]:

@@ -82,7 +82,7 @@ class Indexed:
 
     @cached_property
     def with_initial(self) -> dict[tuple[str, ...], Level]:
-        """All equations and the initial ones as one level, by the inputs that may move; empty until it is asked for."""
+        """All equations, initial ones included, as one level, by the inputs that may move; filled at first use."""
         return {}
 
     def unknown_symbols(self) -> list[str]:

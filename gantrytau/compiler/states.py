@@ -115,7 +115,7 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
 
 
 def _project(rest: np.ndarray, sizes: np.ndarray, column: int) -> None:
-    """Take the direction of a column out of all columns, of which only those change that share a row with it."""
+    """Take the direction of one column out of all others. Only columns with a row in common change."""
     direction = rest[:, column] / np.linalg.norm(rest[:, column])
     rows = np.flatnonzero(direction) if rest.size > DENSE else np.arange(len(rest))
     shares = direction[rows] @ rest[rows]

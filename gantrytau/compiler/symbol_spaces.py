@@ -68,7 +68,7 @@ def column(elements: Sequence[ca.SX]) -> ca.SX:
 
 
 def together(change: Callable[[ca.SX], ca.SX], expressions: Sequence[ca.SX]) -> list[ca.SX]:
-    """Dense expressions changed as one column, so that what they have in common is gone through once."""
+    """Dense expressions, changed together as one column: shared subexpressions are visited once."""
     dense = [e if e.is_dense() else ca.densify(e) for e in expressions]
     found = change(column([e if e.is_column() else ca.vec(e) for e in dense]))
     pieces = ca.vertsplit(found, np.cumsum([0, *(e.numel() for e in dense)]).tolist())

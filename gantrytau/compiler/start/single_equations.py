@@ -41,7 +41,7 @@ def propagated(level: Level, point: np.ndarray, missing: set[int]) -> np.ndarray
 def _order(
     level: Level, inside: np.ndarray, missing: set[int]
 ) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
-    """Which equations are not linear in missing values, and the rounds in which they give these."""
+    """The equations that are not linear in missing values, and the rounds in which equations give missing values."""
     x, _, jacobian = level.symbolic
     rows, columns = (side[inside] for side in level.entries)
     entries, leaves = jacobian.nonzeros(), x.elements()

@@ -47,7 +47,7 @@ OF_BALLS = "type pos"
 
 
 def read_mjcf_file(file: str | os.PathLike[str], folders: MeshFolders) -> RobotDescription:
-    """The robot of an MJCF file; ModelError for one that cannot be read, or says what no robot can do."""
+    """The robot of an MJCF file. ModelError for a file that cannot be read or describes no robot."""
     xml = expanded(XmlFile.read(file, "MJCF", "mujoco", "<worldbody>"))
     settings = {key: value for part in xml.top.iterfind("compiler") for key, value in part.attrib.items()}
     orientation = Orientation.of(xml, settings)

@@ -82,14 +82,14 @@ def robot_class(robot: RobotDescription, folders: MeshFolders) -> type[Described
 
 
 def _driven(robot: RobotDescription) -> set[str]:
-    """Names of the joints that have a drive: those of the file, or all that move and follow no other."""
+    """Names of the driven joints: those of the file, or else all moving joints without a coupling."""
     free = (joint.name for joint in robot.joints if joint.moves and joint.mimic is None)
     return set(free if robot.driven is None else robot.driven)
 
 
 @dataclass(frozen=True)
 class _Plan:
-    """The members of the class, and what is connected with what, as they come together."""
+    """Collects the components of the class and the connections between them."""
 
     robot: RobotDescription
     driven: set[str]
@@ -304,7 +304,7 @@ def _component_names(robot: RobotDescription) -> dict[str, str]:
 
 
 def _not_in(taken: set[str], name: str, kind: str) -> str:
-    """The name, or with the kind or a number behind it where it is taken, or is that of something of all models."""
+    """The name; where another component or a Model has it already, with the kind or a number behind it."""
     others = (name, f"{name}_{kind}", *(f"{name}_{kind}_{k}" for k in range(2, len(taken) + 3)))
     return next(other for other in others if other not in taken and not hasattr(DescribedRobot, other))
 

@@ -43,7 +43,7 @@ UNLIMITED = 1e15  # m or rad: SDF writes 1e16 where there is no limit
 
 
 def read_sdf_file(file: str | os.PathLike[str], folders: MeshFolders) -> RobotDescription:
-    """The robot of an SDF file; ModelError for one that cannot be read, holds several, or says what no robot can do."""
+    """The robot of an SDF file. ModelError for a file that cannot be read, or holds no robot or several."""
     xml = XmlFile.read(file, "SDF", "sdf", "a <model>")
     models = [*xml.top.iterfind("model"), *xml.top.iterfind("world/model")]
     if len(models) != 1:

@@ -34,7 +34,7 @@ READ = {  # elements, and what is in them; all others are left out
 
 
 def read_urdf_file(file: str | os.PathLike[str]) -> RobotDescription:
-    """The robot of a URDF file; ModelError for one that cannot be read, says nothing sensible, or is no tree."""
+    """The robot of a URDF file. ModelError for a file that cannot be read, or describes no tree of links."""
     xml = XmlFile.read(file, "URDF", "robot", "links and joints")
     reader = _Reader(xml)
     top = xml.top
