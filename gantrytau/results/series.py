@@ -164,6 +164,11 @@ class Series:
         return iter(self._names)
 
     def __getitem__(self, name: str) -> Values:
+        if not isinstance(name, str):
+            raise ModelError(
+                f"{self.title or 'Result'}: [{name!r}] found, a name expected; several are several arguments, as in "
+                "plot('a', 'b'), and several lookups, as in r['a'], r['b']"
+            )
         if name not in self._known:
             values = self._compute(name)
             values.flags.writeable = False
