@@ -126,9 +126,7 @@ def test_an_unknown_name_raises_and_offers_the_closest(circle, lookup):
 
 
 def test_a_list_of_names_is_no_name(circle):
-    with pytest.raises(
-        ModelError, match=r"\['tool\.r', 'phi'\] found, a name expected; several are several arguments"
-    ):
+    with pytest.raises(ModelError, match=r"found name=\['tool\.r', 'phi'\], expected one name"):
         circle.plot(["tool.r", "phi"])
 
 
