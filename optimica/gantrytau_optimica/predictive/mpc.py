@@ -64,15 +64,19 @@ class Mpc:
         self.period = number("Mpc", "period", period, unit="s", above=0.0)
         self.elements = whole("Mpc", "elements", elements, least=1)
         self.delay = whole("Mpc", "delay", delay, least=0, most=1)
-        self.deadline = number("Mpc", "deadline", deadline or math.inf, unit="s", above=0.0, most=math.inf)
+        self.deadline = number(
+            "Mpc", "deadline", math.inf if deadline is None else deadline, unit="s", above=0.0, most=math.inf
+        )
         self._converged = iterations == "converged"
         self.iterations = whole("Mpc", "iterations", MOST if self._converged else iterations, least=1)
         if terminal is not None:
             one_of("Mpc", "terminal", terminal, ("lqr",))
+        if penalty is not None:
+            penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages = _staged(problem, self.period)
         self.name = self.built.read.name
         soft = self._soft(hard)
-        weight = number("Mpc", "penalty", penalty or PENALTY * self._stages.curvature, above=0.0)
+        weight = PENALTY * self._stages.curvature if penalty is None else penalty
         self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, weight)
         self._terminal = Terminal(self._stages, self.elements * self.period)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
