@@ -1,7 +1,6 @@
 """The gallery: its examples run and show something, and solids are drawn as large as they are."""
 
 import io
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -57,9 +56,12 @@ def test_what_stands_in_front_hides_what_is_behind():
     assert not np.array_equal(coloured(behind, *ends), coloured(front, *ends))
 
 
-def test_every_picture_of_the_gallery_leads_to_its_component():
-    drawn_ones = {name: Drawn(one, Path(), False, "") for name, one in examples().items()}
-    page = gallery_page(drawn_ones)
-    for name, one in examples().items():
-        assert f"#{name}\n" in page
-        assert f":alt: {one.alt}\n" in page
+def test_pictures_of_the_gallery_lead_to_components_and_one_that_is_seen_twice_names_both(tmp_path):
+    names = [name for name in examples() if name.startswith("gantrytau.blocks.")]
+    for name in names:
+        (tmp_path / name).write_text("one" if name.endswith("Pid") else name)
+    page = gallery_page({name: Drawn(examples()[name], tmp_path / name, False, "") for name in names})
+    assert page.count("{figure}") == len(names) - 1
+    assert ":target: ../reference/blocks.html#gantrytau.blocks.Gain\n" in page
+    assert "{py:obj}`Pid <gantrytau.blocks.Pid>` {py:obj}`DiscretePid <gantrytau.blocks.DiscretePid>`" in page
+    assert f":alt: {examples()['gantrytau.blocks.Gain'].alt}\n" in page

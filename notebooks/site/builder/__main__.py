@@ -39,7 +39,7 @@ def main() -> int:
         "command_line/index.md": command_page(),
         "sources/index.md": source_page(),
     }
-    for page, text in (*reference_pages(), *error_pages(), *single.items()):
+    for page, text in (*reference_pages(drawn), *error_pages(), *single.items()):
         stage.write(page, text)
     told(begin, f"{len(stage.written)} pages staged; notebooks are executed")
     _stage_notebooks(stage, asked.without_outputs)

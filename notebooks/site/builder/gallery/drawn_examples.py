@@ -7,6 +7,7 @@ import json
 import multiprocessing
 import os
 import re
+import tempfile
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -19,11 +20,19 @@ from gantrytau import translate
 from notebooks.site.builder.executed_notebooks import state
 from notebooks.site.builder.gallery.examples import Example, examples
 from notebooks.site.builder.places import DRAWN
-from notebooks.site.builder.reading.docstrings import escaped
 
 LONGEST = 6000  # letters of equations that still help a reader
+LINES, LETTERS = 2.5, 13  # points, of figures that are seen small, too
 RESOLUTION = 110  # of figures, dots in an inch
-BLOCK = re.compile(r"\\paragraph\{(Block \d+)\} (.*?)\n\\begin\{align\*\}\n(.*?)\\end\{align\*\}", re.DOTALL)
+MARKDOWN = (  # what stands in the LaTeX of equations, and what there is for it
+    (re.compile(r"^(%.*|\\section\*.*)\n", re.MULTILINE), ""),
+    (re.compile(r"\\noindent (.*?)\\par\n"), r"\1\n\n"),
+    (re.compile(r"\\paragraph\{(.*?)\}(.*)"), r"**\1**\2\n"),
+    (
+        re.compile(r"(\\begin\{align\*\}.*?\\end\{align\*\})", re.DOTALL),
+        "```{math}\n:nowrap:\n\n\\1\n```\n",
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -63,12 +72,16 @@ def drawn_examples(workers: int | None = None) -> dict[str, Drawn]:
 def run(example: Example) -> tuple[bytes, bool, str]:
     """The picture of an example as PNG, whether it is a scene, and its equations; RuntimeError where it fails."""
     import matplotlib as mpl
+    import matplotlib.pyplot as plt
 
     mpl.use("Agg")
     names: dict[str, Any] = {"__name__": "__main__"}
     *first, last = ast.parse(example.code).body
     assert isinstance(last, ast.Expr), f"the last line of {example.full} shows nothing"
-    with _films() as films, warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+    style = mpl.rc_context({"lines.linewidth": LINES, "font.size": LETTERS, "legend.framealpha": 0.0})
+    own_folder = contextlib.ExitStack()
+    own_folder.enter_context(contextlib.chdir(own_folder.enter_context(tempfile.TemporaryDirectory())))
+    with _films() as films, warnings.catch_warnings(), own_folder, style:
         warnings.simplefilter("ignore")
         try:
             exec(compile(ast.Module(first, []), example.full, "exec"), names)
@@ -81,8 +94,10 @@ def run(example: Example) -> tuple[bytes, bool, str]:
         picture = scene_picture(films[-1])
     else:
         file = io.BytesIO()
+        shown.suptitle("")
         shown.savefig(file, dpi=RESOLUTION, transparent=True)
         picture = file.getvalue()
+        plt.close(shown)
     return picture, bool(films), _equations(names, example)
 
 
@@ -98,15 +113,47 @@ def _equations(names: dict[str, Any], example: Example) -> str:
     """The equations of the model of an example, those in which the component has a part, in Markdown."""
     model = names.get("model") or names["Example"]()
     text = translate(model, events=True).equations("latex")
-    blocks = [found.groups() for found in BLOCK.finditer(text)]
-    blocks = [one for one in blocks if f"({example.name})" in one[1]] or blocks
-    parts = [
-        f"{number}, {escaped(words)}\n\n```{{math}}\n:nowrap:\n\n\\begin{{align*}}\n{lines}\\end{{align*}}\n```"
-        for number, words, lines in blocks
-    ]
-    kept = ""
-    for part in parts:
-        if len(kept) + len(part) > LONGEST:
-            return f'{kept}Of {len(parts)} blocks; `translate(...).equations("html")` writes a page of all.'
-        kept += f"{part}\n\n"
-    return kept
+    begin, *blocks = re.split(r"^(?=\\paragraph)", text, flags=re.MULTILINE)
+    own = [block for block in blocks if f"({example.name})" in block.partition("\n")[0]] or blocks
+    parts = [_markdown(part) for part in (begin, *own)]
+    kept = [part for part in parts if len(part) < LONGEST / len(parts) ** 0.5]
+    if len(kept) < len(parts):
+        kept.append('Longer ones are left out: `translate(...).equations("html")` writes a page of all.')
+    return "\n\n".join(kept)
+
+
+def _markdown(latex: str) -> str:
+    """A part of the equations in Markdown."""
+    for pattern, there in MARKDOWN:
+        latex = pattern.sub(there, latex)
+    return latex.strip()
+
+
+def shown_example(drawn: Drawn, folder: str) -> str:
+    """Picture, code and equations of an example in Markdown; folder: of the pictures, from the page."""
+    return f"""
+```{{image}} {folder}/{drawn.example.full}.png
+{picture_options(drawn)}
+```
+
+```python
+{drawn.example.code}
+```
+
+```{{raw}} html
+<details><summary>Equations of the example</summary>
+```
+
+{drawn.equations}
+
+```{{raw}} html
+</details>
+```
+"""
+
+
+def picture_options(drawn: Drawn, target: str = "") -> str:
+    """The options of a picture in Markdown; target: the page that it leads to."""
+    options = [f":alt: {drawn.example.alt}", ":loading: lazy"]
+    options += [f":class: {'scene' if drawn.scene else 'curves'}"]
+    return "\n".join(options + ([f":target: {target}"] if target else []))

@@ -11,7 +11,8 @@ from typing import Any
 from notebooks.site.builder.places import SOURCES
 
 ROTATIONAL = "gantrytau.mechanics.rotational"
-TWINS = {  # names and letters of rotation, and those of translation
+TWINS = {  # places, names and letters of rotation, and those of translation
+    "load.flange_a": "load.flange",
     "rotational": "translational",
     "Inertia": "Mass",
     "Torque": "Force",
@@ -52,20 +53,20 @@ class Example:
 def examples() -> dict[str, Example]:
     """All examples, by the full names of their components."""
     parts = tomllib.loads((SOURCES / "gallery.toml").read_text(encoding="utf-8"))["part"]
-    found = [one for part in parts for bench in part["bench"] for one in _of_bench(part["title"], bench)]
+    found = [one for part in parts for bench in part["bench"] for one in _of_bench(part, bench)]
     return {one.full: one for one in found}
 
 
-def _of_bench(part: str, bench: Mapping[str, Any]) -> Iterator[Example]:
+def _of_bench(part: Mapping[str, Any], bench: Mapping[str, Any]) -> Iterator[Example]:
     for module, components in bench["of"].items():
         for name, given in components.items():
             words = {"arguments": given} if isinstance(given, str) else given
             call = f"{name}({words.get('arguments', '')})"
-            known = {"name": name, "module": module, "part": call, **words}
+            known = {"name": name, "module": module, "part": call, **bench.get("words", {}), **words}
             code, shows = (Template(bench[key]).substitute(known).strip() for key in ("code", "shows"))
-            yield Example(part, f"{module}.{name}", code, shows)
+            yield Example(part["title"], f"{module}.{name}", code, shows)
             if bench.get("twins"):
-                yield Example(part, _twin(f"{module}.{name}"), _twin(code), _twin(shows))
+                yield Example(part["twin"], _twin(f"{module}.{name}"), _twin(code), _twin(shows))
 
 
 def _twin(text: str) -> str:

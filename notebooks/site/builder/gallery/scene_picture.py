@@ -142,10 +142,9 @@ class _Canvas:
     def pixels(self) -> np.ndarray:
         """RGBA (HEIGHT, WIDTH, 4), the mean over the rays of each pixel."""
         flipped = self.colour[::-1].reshape(HEIGHT, FINE, WIDTH, FINE, 4)
-        share = flipped[..., 3:] / 255
-        opaque = share.sum(axis=(1, 3))
-        mixed = (flipped[..., :3] * share).sum(axis=(1, 3)) / np.maximum(opaque, 1e-12)
-        return np.concatenate([mixed, 255 * opaque / FINE**2], axis=-1).round().astype(np.uint8)
+        mean = flipped.mean(axis=(1, 3))  # colours times their opacity
+        straight = mean[..., :3] / np.maximum(mean[..., 3:] / 255, 1e-12)
+        return np.concatenate([straight, mean[..., 3:]], axis=-1).round().astype(np.uint8)
 
 
 def _nearest(
