@@ -177,3 +177,64 @@ def test_an_enumeration_that_varies_has_a_number_and_sizes_an_array(tmp_path):
     )
     found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
     assert [*found.at(np.array([0.2, 0.8]), "number"), *found.at(np.array([0.2]), "last")] == [1, 2, 1]
+
+
+CHANGES = """type Gear = enumeration(low, high);
+block Counter
+  input Boolean u;
+  input Integer k;
+  output Integer n(start=0), step(start=0);
+equation
+  when change(u) then
+    n = pre(n) + 1;
+  end when;
+  when change(k) then
+    step = k - pre(k);
+  end when;
+end Counter;
+model M
+  Boolean up = time > 1, rises = edge(up), late = time > 2;
+  Integer whole = integer(time), k(start=0), j(start=0), twice, sum;
+  Gear gear = if time < 1.5 then Gear.low else Gear.high;
+  Integer risen(start=0), both(start=0), shifts(start=0), seen(start=0), last(start=0), set(start=0);
+  Real x(start=0, fixed=true);
+  Counter counter(u=up, k=if time < 1 then 5 elseif time < 2 then 8 else 2);
+equation
+  der(x) = pre(whole) + (if edge(up) then 1 else 0);
+  when rises then
+    risen = pre(risen) + 1;
+  end when;
+  when edge(up) or late and not pre(late) then
+    both = pre(both) + 1;
+  end when;
+  when change(gear) then
+    shifts = pre(shifts) + 1;
+  end when;
+  when time >= 2 then
+    last = whole - pre(whole);
+  end when;
+  when sample(1, 1) then
+    k = pre(k) + 3;
+  end when;
+  when change(k) then
+    set = k - pre(k);
+  end when;
+  when sum >= 6 then
+    j = 1;
+  end when;
+  twice = 2 * j;
+  sum = k + twice;
+  when change(sum) then
+    seen = sum;
+  end when;
+end M;
+"""
+
+
+def test_edges_and_changes_are_seen_at_the_instant_they_happen(tmp_path):
+    (tmp_path / "changes.mo").write_text(CHANGES)
+    found = simulate(load_modelica(tmp_path / "changes.mo")["M"](), stop=2.75)
+    wanted = dict(risen=1, both=2, shifts=1, last=1, set=3, seen=8, x=2.5)
+    np.testing.assert_allclose([found.final(name) for name in wanted], [*wanted.values()], atol=1e-7)
+    counted = found.at(np.array([0.5, 1.5, 2.5]), "counter.n"), found.at(np.array([1.5, 2.5]), "counter.step")
+    assert [one.tolist() for one in counted] == [[0, 1, 1], [3, -6]]

@@ -9,11 +9,12 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import Items
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.statements import Items, looped
+from gantrytau.modelica.elaboration.statements import looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.table_functions import external_value
 
@@ -79,6 +80,7 @@ class Execution:
                         target.at,
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
+                self._refuse_given(target, reader)
                 wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
@@ -89,6 +91,15 @@ class Execution:
                     self.known[name] = _with(self.known[name], target.parts, one, reader)
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
+
+    def _refuse_given(self, target: tree.ComponentReference, reader: Interpreter) -> None:
+        """TextError where what is assigned is known from outside."""
+        name = target.parts[0][0]
+        prefixes = reader.scope.elements[name].clause.prefixes if name in reader.scope.elements else ()
+        given = next((word for word in ("input", "parameter", "constant") if word in prefixes), "")
+        if given == "input" or (given and reader.members.is_fixed(target)):
+            words = f"found the {given} '{name}' assigned, expected a variable; assign to one of another name"
+            reader.scope.refuse(target.at, words)
 
     def _check_shape(self, name: str, value: Any) -> None:
         shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)

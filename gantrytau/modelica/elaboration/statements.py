@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import reduce
 from typing import Any, TypeGuard, cast
 
 import casadi as ca
@@ -10,19 +11,18 @@ import numpy as np
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete
 from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_and, logic_not
+from gantrytau.language.functions import floor, if_else, logic_and, logic_not, logic_or
 from gantrytau.language.statements import connect, require
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import BEFORE, Items, changed_in, instant_and_rest, is_call, sample_calls
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, changed, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.references import nodes_of
 
 ROUNDING = 1e-6  # of a period, by which an instant may be located early
-BEFORE = frozenset({"pre", "edge", "change"})
-Items = Sequence[tree.EquationOrStatement]
 
 
 class AbsentComponent(Exception):
@@ -95,12 +95,17 @@ def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iter
         yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
 
 
-def first_valued(item: tree.EquationOrStatement) -> str:
-    """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
-    left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
-    if isinstance(left, tree.Call) and _is_call(left, "pre"):
-        (left,) = left.arguments
-    return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
+def follows(variable: ca.SX, old: ca.SX, turn: ca.SX) -> WhenChain:
+    """What makes a Discrete follow a variable one round later; turn: the parity of its changes."""
+    change, act = changed(variable, old), (old == variable, turn == 1 - pre(turn))
+    return WhenChain(tuple(Happening(test, act, initially=True) for test in _both(change, [turn])))
+
+
+def _both(change: Any, turns: Sequence[ca.SX]) -> Iterator[Any]:
+    """The two conditions of which one becomes true by each change, also by one in the round after another."""
+    odd = [turn > 0.5 for turn in turns]
+    other = reduce(lambda a, b: logic_or(logic_and(a, logic_not(b)), logic_and(b, logic_not(a))), odd)
+    yield from (logic_and(change, other), logic_and(change, logic_not(other)))
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
@@ -111,10 +116,7 @@ def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tre
     asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
     inside = {id(one) for one in asked}
     others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
-    jumps = any(one.function.parts[0][0] in ("edge", "change") for one in calls)
-    return members.type_of(item.left) in ("Boolean", "Integer") and bool(
-        jumps or others or item.left in asked
-    )
+    return members.type_of(item.left) in ("Boolean", "Integer") and bool(others or item.left in asked)
 
 
 def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
@@ -269,38 +271,30 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
 
 def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
     for test, items in item.branches:
+        reader = replace(reader, following=frozenset(changed_in(test, items)))
         conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
         actions = tuple(_actions(items, reader))
         if len(item.branches) == 1:
-            test, rest = _instant_and_rest(test)
+            test, rest = instant_and_rest(test)
             conditions = (test,) if rest is not None else conditions
             if rest is not None:
                 actions = tuple(_guarded(actions, reader.value(rest)))
         for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
-            if _is_call(one, "initial"):
+            if is_call(one, "initial"):
                 yield at_start(actions)
                 continue
-            edge = cast(tree.Call, one).arguments[0] if _is_call(one, "edge") else one
+            edge = cast(tree.Call, one).arguments[0] if is_call(one, "edge") else one
             found = values.condition(reader.value(edge))
             if isinstance(found, ca.SX):
                 refuse_change(found)
             sampled = any(sample_calls(one))
-            yield Happening(found, actions, "sample" if sampled else "", sampled, _failure(items, reader))
-
-
-def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
-    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
-    conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-    return tuple(_instant_and_rest(one)[0] for one in conditions)
-
-
-def _instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
-    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
-    if isinstance(test, tree.Binary) and test.operator == "and":
-        for one, other in ((test.left, test.right), (test.right, test.left)):
-            if _is_call(one, "sample") or _is_call(one, "edge"):
-                return one, other
-    return test, None
+            turns = [
+                x
+                for name in sorted(set(changed_in(one, items)))
+                if (x := reader.members.turn(name)) is not None
+            ]
+            for each in _both(found, turns) if turns else (found,):
+                yield Happening(each, actions, "sample" if sampled else "", sampled, _failure(items, reader))
 
 
 def _guarded(actions: Sequence[Any], test: Any) -> Iterator[Any]:
@@ -321,26 +315,10 @@ def at_start(actions: tuple[Any, ...]) -> Happening:
     return Happening(time > -1e30, actions, "at the start", True)
 
 
-def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
-    """The calls of `sample` in a condition of `when`."""
-    left = [test]
-    for one in left:
-        if isinstance(one, tree.Call) and _is_call(one, "sample") and len(one.arguments) == 2:
-            yield one
-        elif isinstance(one, tree.ArrayConstructor):
-            left += one.items
-        elif isinstance(one, tree.Binary):
-            left += [one.left, one.right]
-
-
-def _is_call(e: tree.Expression, name: str) -> bool:
-    return isinstance(e, tree.Call) and e.function.parts[0][0] == name
-
-
 def _failure(items: Items, reader: Interpreter) -> str:
     """The words of `assert(false, words)` in a branch of `when`; "" without one."""
     calls = [one.call for one in items if isinstance(one, tree.ProcedureCall)]
-    ends = [one for one in calls if _is_call(one, "assert") and reader.value(one.arguments[0]) is False]
+    ends = [one for one in calls if is_call(one, "assert") and reader.value(one.arguments[0]) is False]
     return reader.value(ends[0].arguments[1]) if ends else ""
 
 
