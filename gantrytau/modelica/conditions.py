@@ -55,14 +55,30 @@ def calls_before(e: Any) -> Iterator[tree.Call]:
 
 
 def targets(items: Items) -> Iterator[str]:
-    """Names of what the equations in a `when` set."""
+    """Names of the variables that statements, or the equations in a `when`, set."""
     for item in items:
-        if isinstance(item, tree.ForLoop):
+        if isinstance(item, (tree.ForLoop, tree.WhileLoop)):
             yield from targets(item.items)
+        elif isinstance(item, tree.Branching):
+            for _, inner in (*item.branches, (None, item.otherwise or ())):
+                yield from targets(inner)
         left = item.left if isinstance(item, tree.SimpleEquation) else None
-        for each in left.items if isinstance(left, tree.OutputList) else (left,):
+        several = left.items if isinstance(left, tree.OutputList) else (left,)
+        for each in item.targets if isinstance(item, tree.Assignment) else several:
             if isinstance(each, tree.ComponentReference):
                 yield each.parts[0][0]
+
+
+def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
+    """Calls of `assert`, and of `terminate` under a further condition, in a `when`."""
+    for item in items:
+        if isinstance(item, tree.Branching):
+            for _, inner in (*item.branches, (None, item.otherwise or ())):
+                yield from checks_in(inner, True)
+        elif isinstance(item, tree.ProcedureCall) and (
+            is_call(item.call, "assert") or (inside and is_call(item.call, "terminate"))
+        ):
+            yield item.call
 
 
 def changed_in(test: tree.Expression, items: Items) -> Iterator[str]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import load_modelica, simulate
+from gantrytau import SolveError, load_modelica, simulate
 
 STICKING = """model M "unit mass on dry friction of 2 N, pushed by 3 N behind 2 s"
   Real v(start=1, fixed=true), a, sa, f;
@@ -238,3 +238,65 @@ def test_edges_and_changes_are_seen_at_the_instant_they_happen(tmp_path):
     np.testing.assert_allclose([found.final(name) for name in wanted], [*wanted.values()], atol=1e-7)
     counted = found.at(np.array([0.5, 1.5, 2.5]), "counter.n"), found.at(np.array([1.5, 2.5]), "counter.step")
     assert [one.tolist() for one in counted] == [[0, 1, 1], [3, -6]]
+
+
+STEPS = """model M
+  Boolean late = time > 2.5;
+  Integer n(start=0), k(start=0), guarded(start=0), v[2](each start=0), last(start=0);
+  Real x(start=0, fixed=true), y;
+equation
+  der(x) = 1;
+  when sample(0, 1) then
+    if late then
+      reinit(x, 0);
+    else
+      n = pre(n) + 1;
+      for i in 1:2 loop
+        v[i] = pre(v[i]) + i;
+      end for;
+    end if;
+    assert(x < 9, "too far");
+  end when;
+  when sample(0, 1) and n > 2 then
+    guarded = pre(guarded) + 1;
+  elsewhen time >= 1 then
+    guarded = pre(guarded) + 100;
+  end when;
+  when x > 0.8 then
+    if late then
+      terminate("done");
+    end if;
+  end when;
+algorithm
+  y := n;
+  when sample(0, 1) then
+    k := k + 1;
+    if k > 2 then
+      k := 10 * k;
+    end if;
+  elsewhen time > 1.5 then
+    k := 7;
+  end when;
+  when k >= 7 then
+    last := k;
+  end when;
+  y := y + k;
+end M;
+"""
+
+
+def test_whens_hold_conditions_loops_checks_and_algorithms(tmp_path):
+    (tmp_path / "steps.mo").write_text(STEPS)
+    found = simulate(load_modelica(tmp_path / "steps.mo")["M"](), stop=9.0)
+    assert found.ended == "done"
+    np.testing.assert_allclose(found["time"][-1], 3.8, atol=1e-9)
+    names = ("n", "guarded", "k", "last", "y")
+    assert [found.final(name) for name in names] == [3, 102, 810, 7, 813]
+    assert found.final("v").tolist() == [3, 6]
+
+
+def test_an_assertion_in_a_when_is_looked_at_where_it_acts(tmp_path):
+    text = 'model M Real x = time; equation when time > 1 then assert(x < 0.5, "too far"); end when; end M;'
+    (tmp_path / "m.mo").write_text(text)
+    with pytest.raises(SolveError, match="too far"):
+        simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=2.0)

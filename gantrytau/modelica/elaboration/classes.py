@@ -16,12 +16,13 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
     calls_before,
     changed_in,
+    checks_in,
     first_valued,
     instants,
     sample_calls,
     targets,
 )
-from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
+from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
 from gantrytau.modelica.elaboration.placed import (
     AT_START,
@@ -36,12 +37,11 @@ from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
-    at_start,
-    follows,
     remembers,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.elaboration.whens import at_start, follows
 from gantrytau.modelica.references import dotted, nodes_of
 
 
@@ -160,6 +160,10 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     for name in _followed(structure):
         body[followed_name(BEFORE, name)] = Discrete(0, description=f"{name} before an instant")
         body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
+    for call in (
+        call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
+    ):
+        body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
@@ -350,7 +354,7 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
         try:
             if starts and (steps or not initial):
-                named = set(assigned(items)) - held if initial else held.intersection(assigned(items))
+                named = set(targets(items)) - held if initial else held.intersection(targets(items))
                 found = stated_by_algorithm(items, reader, named) if named else ()
             else:
                 found = (stated_by_algorithm if steps else stated)(items, reader)

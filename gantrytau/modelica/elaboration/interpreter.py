@@ -331,6 +331,8 @@ class Interpreter:
             return found
         if name == "initial":
             return self.members.next_sample(e) > 0.5
+        if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
+            inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = self.function(e)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}

@@ -30,8 +30,9 @@ def followed_name(kind: str, name: str) -> str:
 
 
 def sample_name(call: tree.Call) -> str:
-    """The name of the Discrete that holds the next instant of a `sample`, or whether it is the start."""
-    return f"next_sample_{call.at}" if call.arguments else AT_START
+    """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
+    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
+    return f"{kind}_{call.at}" if call.arguments else AT_START
 
 
 class PlacedMembers:

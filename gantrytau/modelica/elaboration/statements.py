@@ -1,8 +1,7 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from functools import reduce
 from typing import Any, TypeGuard, cast
 
 import casadi as ca
@@ -10,19 +9,21 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete
-from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_and, logic_not, logic_or
+from gantrytau.language.events import Happening, WhenChain, reinit, terminate
+from gantrytau.language.functions import if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
-from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import BEFORE, Items, changed_in, instant_and_rest, is_call, sample_calls
+from gantrytau.modelica.conditions import (
+    BEFORE,
+    Items,
+    is_call,
+)
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, changed, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
+from gantrytau.modelica.elaboration.whens import chosen_actions, when_chains
 from gantrytau.modelica.references import nodes_of
-
-ROUNDING = 1e-6  # of a period, by which an instant may be located early
 
 
 class AbsentComponent(Exception):
@@ -55,15 +56,7 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
         for inner in looped(item, reader):
             yield from stated(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "when":
-        yield WhenChain(tuple(_when(item, reader)))
-        for call in (call for test, _ in item.branches for call in sample_calls(test)):
-            instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
-            passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
-            action = instant == pre(instant) + passed * period
-            advance = Happening(time >= instant, (action,), "sample", True)
-            first = at_start((instant == reader.value(call.arguments[0]),))
-            known = reader.members.is_fixed(call.arguments[0])
-            yield WhenChain((advance,) if known else (first, advance))
+        yield from when_chains(item, reader, _actions)
     elif isinstance(item, tree.Branching):
         yield from _branches(item, reader)
     elif isinstance(item, tree.ProcedureCall):
@@ -93,19 +86,6 @@ def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iter
         return
     for value in range(limits[0], limits[1] + 1):
         yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
-
-
-def follows(variable: ca.SX, old: ca.SX, turn: ca.SX) -> WhenChain:
-    """What makes a Discrete follow a variable one round later; turn: the parity of its changes."""
-    change, act = changed(variable, old), (old == variable, turn == 1 - pre(turn))
-    return WhenChain(tuple(Happening(test, act, initially=True) for test in _both(change, [turn])))
-
-
-def _both(change: Any, turns: Sequence[ca.SX]) -> Iterator[Any]:
-    """The two conditions of which one becomes true by each change, also by one in the round after another."""
-    odd = [turn > 0.5 for turn in turns]
-    other = reduce(lambda a, b: logic_or(logic_and(a, logic_not(b)), logic_and(b, logic_not(a))), odd)
-    yield from (logic_and(change, other), logic_and(change, logic_not(other)))
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
@@ -256,10 +236,9 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
     arguments = dict(zip(("condition", "message", "level"), item.call.arguments, strict=False)) | dict(
         item.call.named
     )
-    level = reader.value(arguments["level"]) if "level" in arguments else 2
+    if not _is_error(item.call, reader):
+        return
     holds, words = reader.value(arguments["condition"]), reader.value(arguments["message"])
-    if level != 2:
-        return  # a warning
     if isinstance(holds, ca.SX):
         if reader.members.is_fixed(arguments["condition"]):
             yield require(holds, words)
@@ -269,74 +248,52 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
         raise ModelError(f"found an assertion that does not hold: {words}")
 
 
-def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
-    for test, items in item.branches:
-        reader = replace(reader, following=frozenset(changed_in(test, items)))
-        conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-        actions = tuple(_actions(items, reader))
-        if len(item.branches) == 1:
-            test, rest = instant_and_rest(test)
-            conditions = (test,) if rest is not None else conditions
-            if rest is not None:
-                actions = tuple(_guarded(actions, reader.value(rest)))
-        for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
-            if is_call(one, "initial"):
-                yield at_start(actions)
-                continue
-            edge = cast(tree.Call, one).arguments[0] if is_call(one, "edge") else one
-            found = values.condition(reader.value(edge))
-            if isinstance(found, ca.SX):
-                refuse_change(found)
-            sampled = any(sample_calls(one))
-            turns = [
-                x
-                for name in sorted(set(changed_in(one, items)))
-                if (x := reader.members.turn(name)) is not None
-            ]
-            for each in _both(found, turns) if turns else (found,):
-                yield Happening(each, actions, "sample" if sampled else "", sampled, _failure(items, reader))
+def _is_error(call: tree.Call, reader: Interpreter) -> bool:
+    """Whether an `assert` is no warning."""
+    level = dict(call.named).get("level") or next(iter(call.arguments[2:]), None)
+    return level is None or reader.value(level) == 2
 
 
-def _guarded(actions: Sequence[Any], test: Any) -> Iterator[Any]:
-    """Actions where a condition holds with the new values of what changes at the instant, else none."""
-    test = values.condition(test)
-    for one in actions:
-        if isinstance(one, Reinit):
-            yield reinit(one.variable, if_else(test, one.value, one.variable))
-        elif isinstance(one, ca.SX):
-            for scalar in one.elements():
-                yield scalar.dep(0) == if_else(test, scalar.dep(1), pre(scalar.dep(0)))
-        else:
-            raise ModelError("found terminate() beside sample() and another condition, expected another when")
-
-
-def at_start(actions: tuple[Any, ...]) -> Happening:
-    """What happens at the start and never again: a condition on the time that always holds."""
-    return Happening(time > -1e30, actions, "at the start", True)
-
-
-def _failure(items: Items, reader: Interpreter) -> str:
-    """The words of `assert(false, words)` in a branch of `when`; "" without one."""
-    calls = [one.call for one in items if isinstance(one, tree.ProcedureCall)]
-    ends = [one for one in calls if is_call(one, "assert") and reader.value(one.arguments[0]) is False]
-    return reader.value(ends[0].arguments[1]) if ends else ""
-
-
-def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
+def _actions(items: Items, reader: Interpreter, inside: bool = False) -> Iterator[Any]:
+    """The actions of statements in a `when`; inside: under a further condition."""
     for item in items:
+        call = item.call if isinstance(item, tree.ProcedureCall) else None
         if isinstance(item, tree.SimpleEquation):
             _check_types(item, reader, assigned=True)
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):
             for inner in looped(item, reader):
-                yield from _actions(item.items, inner)
-        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "reinit":
-            variable, value = (reader.value(one) for one in item.call.arguments)
-            yield reinit(values.to_casadi(variable), values.to_casadi(value))
-        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "terminate":
-            yield terminate(reader.value(item.call.arguments[0]))
-        elif not _failure([item], reader):
-            reader.scope.refuse(
-                item.at, "found another statement in 'when', expected an equation, reinit or terminate"
-            )
+                yield from _actions(item.items, inner, inside)
+        elif isinstance(item, tree.Branching) and item.word == "if":
+            yield from _chosen(item, reader)
+        elif call is not None:
+            yield action_of(call, reader, inside)
+        else:
+            reader.scope.refuse(item.at, "found another statement in 'when', expected an equation or a call")
+
+
+def action_of(call: tree.Call, reader: Interpreter, inside: bool = False) -> Any:
+    """What `reinit`, `terminate` or `assert` does in a `when`; inside: under a further condition."""
+    if is_call(call, "reinit"):
+        variable, value = (reader.value(one) for one in call.arguments)
+        return reinit(values.to_casadi(variable), values.to_casadi(value))
+    if is_call(call, "terminate") and not inside:
+        return terminate(reader.value(call.arguments[0]))
+    if is_call(call, "assert"):
+        holds = reader.value(call.arguments[0]) if _is_error(call, reader) else True
+        fails = if_else(values.condition(holds), 0, 1) if isinstance(holds, ca.SX) else int(not holds)
+    elif not is_call(call, "terminate"):
+        reader.scope.refuse(call.at, "found another call in 'when', expected reinit, terminate or assert")
+    else:
+        fails = 1
+    return reader.members.next_sample(call) == fails
+
+
+def _chosen(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
+    """An `if` in a `when`."""
+    tests, last = reader.open_branches(item.branches, item.otherwise or ())
+    found: Iterable[Any] = _actions(last, reader, bool(tests))
+    for test, items in reversed(tests):
+        found = chosen_actions(values.condition(test), _actions(items, reader, True), found)
+    yield from found
