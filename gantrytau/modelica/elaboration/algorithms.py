@@ -15,7 +15,7 @@ from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import Items, looped
 from gantrytau.modelica.elaboration.values import RecordValue
-from gantrytau.modelica.table_functions import external_value
+from gantrytau.modelica.external.functions import external_value
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -259,10 +259,7 @@ def called_class(
     if record:
         return RecordValue(run.known)
     if external is not None:
-        reader = replace(run.reader, local=run.known)
-        return external_value(
-            external.function or definition.name, [reader.value(e) for e in external.arguments]
-        )
+        return _external(scope, external, run)
     try:
         for section in scope.sections:
             run.reader = replace(run.reader, scope=section.scope)
@@ -275,6 +272,19 @@ def called_class(
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
     return found if len(found) != 1 else first_result(found)
+
+
+def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:
+    """The value of an external function, whose outputs may stand among the arguments."""
+    outputs = {n for n, e in scope.elements.items() if "output" in e.clause.prefixes}
+    reader = replace(run.reader, local=run.known)
+    given = [e for e in external.arguments if not _names_one(e, outputs)]
+    name = external.function or scope.definition.name
+    return external_value(name, [reader.value(e) for e in given], scope.root.inherited_class)
+
+
+def _names_one(e: tree.Expression, names: Collection[str]) -> bool:
+    return isinstance(e, tree.ComponentReference) and e.parts[0][0] in names
 
 
 def _is_open(value: Any) -> bool:
