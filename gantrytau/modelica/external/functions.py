@@ -9,6 +9,8 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.modelica.external import tables
 from gantrytau.modelica.source import SourceText
 
+PATH = "ModelicaInternal_fullPathName"
+
 
 class Package(Protocol):
     """A class of Modelica text and where it stands."""
@@ -18,15 +20,17 @@ class Package(Protocol):
 
 
 def external_value(name: str, arguments: Sequence[Any], package: Callable[[str], Package | None]) -> Any:
-    """The value of an external function, several as a tuple; ModelError for one that is not known.
+    """The value of an external function that is known, several as a tuple.
 
     package: the package of a name, in whose folder resources are found.
     """
-    if name == "ModelicaInternal_fullPathName":
-        return _full_path(arguments[0], package)
-    if name not in FUNCTIONS:
+    return _full_path(arguments[0], package) if name == PATH else FUNCTIONS[name](*arguments)
+
+
+def check_known(name: str) -> None:
+    """ModelError for an external function that is not known."""
+    if name not in (PATH, *FUNCTIONS):
         raise ModelError(f"found the external function {name}(), which is not supported; write an algorithm")
-    return FUNCTIONS[name](*arguments)
 
 
 def _full_path(name: str, package: Callable[[str], Package | None]) -> str:

@@ -1,12 +1,15 @@
 """Curves and surfaces through points by the slopes around each: parabolas are kept, monotone data stay monotone."""
 
+from importlib import import_module
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
 
 from gantrytau.language.tables.hermite import SLOPES, curve, surface
 
+interpolate: Any = import_module("scipy.interpolate")
 x, y = ca.SX.sym("x"), ca.SX.sym("y")
 ROUNDING = 1e-12  # of numbers below 100
 RISES = np.array([0.0, 1.0, 1.5, 4.0, 5.0, 7.0]), np.array([10.0, 10.0, 10.5, 15.0, 50.0, 85.0])
@@ -23,9 +26,9 @@ def values(expression, *at):
 def test_curves_are_those_of_scipy(kind, wanted):
     at = np.linspace(0, 7, 57)
     if wanted is None:  # the ends differ there
-        true, inside = PchipInterpolator(*RISES)(at), (at >= 1) & (at <= 5)
+        true, inside = interpolate.PchipInterpolator(*RISES)(at), (at >= 1) & (at <= 5)
     else:
-        true, inside = Akima1DInterpolator(*RISES, method=wanted)(at), at >= 0
+        true, inside = interpolate.Akima1DInterpolator(*RISES, method=wanted)(at), at >= 0
     found = values(curve(x, *RISES, kind, "hold"), at)
     np.testing.assert_allclose(found[inside], true[inside], rtol=0, atol=ROUNDING * 100)
 
