@@ -1,6 +1,6 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard, cast
 
