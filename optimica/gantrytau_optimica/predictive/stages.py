@@ -57,7 +57,7 @@ class Stages:
             for part in (phase.states, phase.algebraics, phase.inputs)
         )
         self.nw = 2 * (nx + nz)
-        self._maps: dict[int, ca.Function] = {}
+        self._maps: dict[int, AtPoints] = {}
         self.size_w = np.tile(np.append(self.sizes_x, self.sizes_z), 2)
         bounds = signal_limits(phase, problem.name)
         ends = np.array([bounds[s.name] for s in phase.inputs], dtype=float).reshape(nu, 2)
@@ -166,21 +166,17 @@ class Stages:
         """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s."""
         n, nx, nz, nu = len(u), self.nx, self.nz, self.nu
         y, t = self.points(w, u), times[:, None] + self.step * NODES
-        found = self._mapped(2 * n)(y.reshape(2 * n, -1).T, t.reshape(1, -1), self.course_values(t.ravel()))
-        e, J, gradient, curved, rows, R = (np.asarray(one) for one in found)
-
-        def stacked(flat: np.ndarray) -> np.ndarray:
-            """A matrix for each point, side by side, as (N, 2, rows, columns)."""
-            return flat.reshape(flat.shape[0], n, 2, flat.shape[1] // (2 * n)).transpose(1, 2, 0, 3)
-
-        J, e = stacked(J), e.T.reshape(n, 2, -1)
+        e, J, gradient, curved, rows, R = (
+            one.reshape(n, 2, *one.shape[1:])
+            for one in self._mapped(2 * n)(y, t, self.course_values(t.ravel()))
+        )
         # algebraics by (1, x, u) of their point
         z = np.zeros((n, 2, nz, 1 + nx + nu))
         if nz:
-            right = np.concatenate([e[..., nx:, None], J[..., nx:, :nx], J[..., nx:, nx + nz :]], axis=3)
+            right = np.concatenate([e[..., nx:, :], J[..., nx:, :nx], J[..., nx:, nx + nz :]], axis=3)
             z = -np.linalg.solve(J[..., nx:, nx : nx + nz], right)
         along = J[..., :nx, nx : nx + nz] @ z
-        f0 = e[..., :nx] + along[..., 0]
+        f0 = e[..., :nx, 0] + along[..., 0]
         fx, fu = J[..., :nx, :nx] + along[..., 1 : 1 + nx], J[..., :nx, nx + nz :] + along[..., 1 + nx :]
         # the states of both points by (1, x, u) of the stage
         left = np.tile(np.eye(2 * nx), (n, 1, 1))
@@ -198,9 +194,9 @@ class Stages:
         T[:, :, nx : nx + nz] = z[..., 1 : 1 + nx] @ states
         T[:, :, nx : nx + nz, 0] += z[..., 0]
         T[:, :, nx : nx + nz, 1 + nx :] += z[..., 1 + nx :]
-        H, g = self._costs(T, gradient, stacked(curved))
-        limits = (stacked(R) @ T).reshape(n, 2 * len(self.path), 1 + nx + nu)
-        limits[..., 0] += rows.T.reshape(n, 2 * len(self.path))
+        H, g = self._costs(T, gradient, curved)
+        limits = (R @ T).reshape(n, 2 * len(self.path), 1 + nx + nu)
+        limits[..., 0] += rows.reshape(n, 2 * len(self.path))
         return Linear(
             A=T[:, 1, :nx, 1 : 1 + nx], B=T[:, 1, :nx, 1 + nx :], b=y[:, 1, :nx] + T[:, 1, :nx, 0],
             H=H, g=g, C=limits[..., 1 : 1 + nx], D=limits[..., 1 + nx :], r=limits[..., 0],
@@ -214,14 +210,14 @@ class Stages:
         n, weights = len(T), WEIGHTS * self.step
         some = T[:, :, self._costly]
         bent = curved @ some
-        slope = np.einsum("p,npiv,npi->nv", weights, T[..., 1:], gradient.T.reshape(n, 2, -1))
+        slope = np.einsum("p,npiv,npi->nv", weights, T[..., 1:], gradient[..., 0])
         slope += np.einsum("p,npiv,npi->nv", weights, some[..., 1:], bent[..., 0])
         H = np.einsum("p,npiv,npiw->nvw", weights, some[..., 1:], bent[..., 1:])
         return convex(H), slope
 
-    def _mapped(self, count: int) -> ca.Function:
+    def _mapped(self, count: int) -> "AtPoints":
         if count not in self._maps:
-            self._maps[count] = kernel(self._point, CALLS, wait=True).map(count)
+            self._maps[count] = AtPoints(kernel(self._point, CALLS, wait=True), count)
         return self._maps[count]
 
     def moved(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
@@ -249,6 +245,28 @@ class Stages:
     @cached_property
     def _spending(self) -> ca.Function:
         return ca.Function("spent", list(self.symbols), [self.at_point(self.phase.integrand)])
+
+
+class AtPoints:
+    """A function of a point at many points, in memory of its own, where NumPy finds what CasADi wrote."""
+
+    def __init__(self, function: ca.Function, count: int):
+        self._function = function.map(count)
+        self._buffer, self._evaluate = self._function.buffer()
+        self._given = [np.zeros((count, function.numel_in(i))) for i in range(function.n_in())]
+        shapes = [function.size_out(i) for i in range(function.n_out())]
+        self._found = [np.zeros((count, columns, rows)) for rows, columns in shapes]
+        for i, values in enumerate(self._given):
+            self._buffer.set_arg(i, memoryview(values))
+        for i, values in enumerate(self._found):
+            self._buffer.set_res(i, memoryview(values))
+
+    def __call__(self, y: np.ndarray, t: np.ndarray, courses: np.ndarray) -> list[np.ndarray]:
+        """Matrices (count, rows, columns), valid until the next call; y (count, k) in any shape, courses (c, count)."""
+        for own, values in zip(self._given, (y, t, courses.T), strict=True):
+            own[:] = values.reshape(own.shape)
+        self._evaluate()
+        return [one.transpose(0, 2, 1) for one in self._found]
 
 
 def convex(H: np.ndarray) -> np.ndarray:
