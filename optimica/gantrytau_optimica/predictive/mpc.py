@@ -152,9 +152,10 @@ class Mpc:
         plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
         prepared, self._prepared = self._prepared, None
         for k in range(MOST if first else self.iterations):
-            linear = self._linear(plan)
             if k == 0 and prepared is not None and abs(prepared[0] - t) < 1e-9 * self.period:
                 linear = prepared[1]
+            else:
+                linear = self._linear(plan)
             found = self._solved(plan, linear, x)
             if not found.solved:
                 return plan, False, change

@@ -14,14 +14,13 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError
-from gantrytau.kernels import kernel
+from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau_optimica.control.control_problem import ControlProblem, Limit
 from gantrytau_optimica.control.limits import bare_limit, signal_limits
 
 NODES = np.array([1 / 3, 1.0])
 MATRIX = np.array([[5 / 12, -1 / 12], [3 / 4, 1 / 4]])
 WEIGHTS = MATRIX[1]
-CALLS = 1e5  # of the functions of a stage, for which kernels are made
 TURNS = 12  # of Newton's method for the unknowns of a stage
 SETTLED = 1e-10  # of their sizes
 
@@ -57,7 +56,6 @@ class Stages:
             for part in (phase.states, phase.algebraics, phase.inputs)
         )
         self.nw = 2 * (nx + nz)
-        self._maps: dict[int, AtPoints] = {}
         self.size_w = np.tile(np.append(self.sizes_x, self.sizes_z), 2)
         bounds = signal_limits(phase, problem.name)
         ends = np.array([bounds[s.name] for s in phase.inputs], dtype=float).reshape(nu, 2)
@@ -166,9 +164,12 @@ class Stages:
         """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s."""
         n, nx, nz, nu = len(u), self.nx, self.nz, self.nu
         y, t = self.points(w, u), times[:, None] + self.step * NODES
+        found = self._at_points(y.reshape(2 * n, -1), t.ravel(), self.course_values(t.ravel()).T)
+        shapes = [self._point.size_out(k) for k in range(self._point.n_out())]
+        # CasADi writes column after column
         e, J, gradient, curved, rows, R = (
-            one.reshape(n, 2, *one.shape[1:])
-            for one in self._mapped(2 * n)(y, t, self.course_values(t.ravel()))
+            one.reshape(n, 2, columns, count).swapaxes(2, 3)
+            for one, (count, columns) in zip(found, shapes, strict=True)
         )
         # algebraics by (1, x, u) of their point
         z = np.zeros((n, 2, nz, 1 + nx + nu))
@@ -207,7 +208,7 @@ class Stages:
         self, T: np.ndarray, gradient: np.ndarray, curved: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Hessians (N, v, v) and gradients (N, v) of the costs of stages by v = (x, u), convex."""
-        n, weights = len(T), WEIGHTS * self.step
+        weights = WEIGHTS * self.step
         some = T[:, :, self._costly]
         bent = curved @ some
         slope = np.einsum("p,npiv,npi->nv", weights, T[..., 1:], gradient[..., 0])
@@ -215,10 +216,9 @@ class Stages:
         H = np.einsum("p,npiv,npiw->nvw", weights, some[..., 1:], bent[..., 1:])
         return convex(H), slope
 
-    def _mapped(self, count: int) -> "AtPoints":
-        if count not in self._maps:
-            self._maps[count] = AtPoints(kernel(self._point, CALLS, wait=True), count)
-        return self._maps[count]
+    @cached_property
+    def _at_points(self) -> AtPlaces:
+        return AtPlaces(self._point)
 
     def moved(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
         """The unknowns of one stage (nw,) that solve its equations, from a guess; ModelError where there are none."""
@@ -239,34 +239,12 @@ class Stages:
     def spent(self, w: np.ndarray, u: np.ndarray, t: float) -> float:
         """The integral over a stage whose unknowns are known."""
         y, times = self.points(w[None], u[None])[0], t + self.step * NODES
-        values = np.asarray(self._spending.map(2)(y.T, times[None], self.course_values(times)))
-        return float(self.step * (values[0] @ WEIGHTS))
+        (values,) = self._spending(y, times, self.course_values(times).T)
+        return float(self.step * (values[:, 0] @ WEIGHTS))
 
     @cached_property
-    def _spending(self) -> ca.Function:
-        return ca.Function("spent", list(self.symbols), [self.at_point(self.phase.integrand)])
-
-
-class AtPoints:
-    """A function of a point at many points, in memory of its own, where NumPy finds what CasADi wrote."""
-
-    def __init__(self, function: ca.Function, count: int):
-        self._function = function.map(count)
-        self._buffer, self._evaluate = self._function.buffer()
-        self._given = [np.zeros((count, function.numel_in(i))) for i in range(function.n_in())]
-        shapes = [function.size_out(i) for i in range(function.n_out())]
-        self._found = [np.zeros((count, columns, rows)) for rows, columns in shapes]
-        for i, values in enumerate(self._given):
-            self._buffer.set_arg(i, memoryview(values))
-        for i, values in enumerate(self._found):
-            self._buffer.set_res(i, memoryview(values))
-
-    def __call__(self, y: np.ndarray, t: np.ndarray, courses: np.ndarray) -> list[np.ndarray]:
-        """Matrices (count, rows, columns), valid until the next call; y (count, k) in any shape, courses (c, count)."""
-        for own, values in zip(self._given, (y, t, courses.T), strict=True):
-            own[:] = values.reshape(own.shape)
-        self._evaluate()
-        return [one.transpose(0, 2, 1) for one in self._found]
+    def _spending(self) -> AtPlaces:
+        return AtPlaces(ca.Function("spent", list(self.symbols), [self.at_point(self.phase.integrand)]))
 
 
 def convex(H: np.ndarray) -> np.ndarray:
