@@ -9,6 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from gantrytau.border.checks import instance
 from gantrytau.compiler.aliases import Alias, Reduced, alias_expression
 from gantrytau.compiler.blocks.pattern import SparsityPattern
 from gantrytau.compiler.blocks.pivots import Guide
@@ -163,7 +164,7 @@ class Translated:
 
     def expand(self, name: str) -> tuple[str, ...]:
         """The scalar names of `name` (a scalar, a vector, or a derivative of one); ModelError if unknown."""
-        return self.flat.expand(name)
+        return self.flat.expand(instance(self.name, "name", name, str, "one name, a string"))
 
     @cached_property
     def _own_names(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gantrytau.border.checks import instance
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.self_description.appearance import Shape
 
@@ -15,6 +16,7 @@ Values = NDArray[np.float64]
 
 # 'tool.r[2]', 'R[0,1]', 'der(tool.r[2])': text before the index, the index, closing brackets behind it
 _ELEMENT = re.compile(r"(.*[^\[])\[(\d+(?:, ?\d+)*)\](\)*)")
+ONE_NAME = "one name, a string; several one by one, as in plot('a', 'b')"
 
 
 class Series:
@@ -164,6 +166,7 @@ class Series:
         return iter(self._names)
 
     def __getitem__(self, name: str) -> Values:
+        instance(self.title or "Result", "name", name, str, ONE_NAME)
         if name not in self._known:
             values = self._compute(name)
             values.flags.writeable = False

@@ -125,6 +125,11 @@ def test_an_unknown_name_raises_and_offers_the_closest(circle, lookup):
         getattr(circle, lookup)("tol.r")
 
 
+def test_a_list_of_names_is_no_name(circle):
+    with pytest.raises(ModelError, match=r"found name=\['tool\.r', 'phi'\], expected one name"):
+        circle.plot(["tool.r", "phi"])
+
+
 @pytest.mark.parametrize("time", [[], [0.0, 2.0, 1.0], [[0.0, 1.0]], [0.0, np.nan]])
 def test_times_that_are_no_grid_raise(time):
     with pytest.raises(ModelError, match="never decreases"):

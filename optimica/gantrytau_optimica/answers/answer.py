@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.border.checks import instance
 from gantrytau.describing.described import Description
 from gantrytau.describing.record import Record
 from gantrytau.language.self_description.appearance import Shape
 from gantrytau.language.symbols import split_derivative
 from gantrytau.results.display_units import Display
+from gantrytau.results.series import ONE_NAME
 from gantrytau_optimica.answers.described_answer import answer_described
 
 if TYPE_CHECKING:
@@ -189,7 +191,7 @@ class Answer(Record, ABC):
 
     def _chosen(self, name: str) -> Any:
         """A free number, or a vector of which some elements are free; else None."""
-        if name in self.free:
+        if instance(self.name, "name", name, str, ONE_NAME) in self.free:
             return self.free[name]
         elements = self._elements(name)
         if not any(element in self.free for element in elements):

@@ -122,6 +122,8 @@ def _parts(played: Replayed, accuracy: float) -> np.ndarray:
     missed = np.nan_to_num(np.max(np.abs(played.x[:, -1] - ends) / sizes, initial=0.0))
     growth = max(1.0, missed / (np.sum(local) or 1.0))  # of errors, by a plant that is unstable
     wanted = accuracy / np.sqrt(n) / growth
+    if missed > accuracy:  # errors of one sign add up: the largest have to fall by what the end is off
+        wanted = min(wanted, float(error.max()) * accuracy / missed / 2)
     passed = np.zeros(n)
     np.maximum.at(passed, owner, _passed(played))
     ratio = np.maximum(error / wanted, passed / accuracy)
