@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gantrytau import Model
 from gantrytau.results.result import Result
 from gantrytau.viewing import Ball, Stick
 from gantrytau.viewing.film import film_of
@@ -14,6 +15,14 @@ from notebooks.site.builder.gallery.drawn_examples import Drawn, run
 from notebooks.site.builder.gallery.examples import examples
 from notebooks.site.builder.gallery.scene_picture import scene_picture
 from notebooks.site.builder.generated.gallery_page import gallery_page
+from notebooks.site.builder.reading.public_names import public_names
+
+OTHERS = {  # what a model, a problem or a fit is made of
+    "gantrytau.Model",
+    "gantrytau_optimica.IdentifiedSystem",
+    "gantrytau_optimica.Optimization",
+    "gantrytau_optimica.Way",
+}
 
 
 @pytest.mark.parametrize("name", examples())
@@ -23,6 +32,15 @@ def test_an_example_runs_and_shows_something(name):
     assert 0.001 < (alpha > 0).mean() < (1.0 if scene else 1.01)
     assert equations
     assert len(examples()[name].alt) > len(examples()[name].name) + 10
+
+
+def test_every_component_has_an_example_unless_it_is_a_base():
+    models = [one for one in public_names() if isinstance(one.value, type) and issubclass(one.value, Model)]
+    concrete = {
+        one.full for one in models if not one.same_as and not (one.value.__doc__ or "").startswith("Base of")
+    }
+    assert concrete - set(examples()) == OTHERS
+    assert set(examples()) <= concrete | {"gantrytau.mechanics.robot_files.DescribedRobot"}
 
 
 def coloured(*shapes):

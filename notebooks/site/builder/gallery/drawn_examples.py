@@ -116,9 +116,12 @@ def _equations(names: dict[str, Any], example: Example) -> str:
     begin, *blocks = re.split(r"^(?=\\paragraph)", text, flags=re.MULTILINE)
     own = [block for block in blocks if f"({example.name})" in block.partition("\n")[0]] or blocks
     parts = [_markdown(part) for part in (begin, *own)]
-    kept = [part for part in parts if len(part) < LONGEST / len(parts) ** 0.5]
+    kept: list[str] = []
+    for part in parts:
+        if len(part) + sum(map(len, kept)) < LONGEST:
+            kept.append(part)
     if len(kept) < len(parts):
-        kept.append('Longer ones are left out: `translate(...).equations("html")` writes a page of all.')
+        kept.append('Others are left out: `translate(...).equations("html")` writes a page of all.')
     return "\n\n".join(kept)
 
 
