@@ -64,11 +64,11 @@ def _duration(path: Path) -> int:
 
 
 def _state(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes() + _state_of_packages()).hexdigest()[:16]
+    return hashlib.sha256(path.read_bytes() + state_of_packages()).hexdigest()[:16]
 
 
 @cache
-def _state_of_packages() -> bytes:
+def state_of_packages() -> bytes:
     """A digest of all files of the packages."""
     digest = hashlib.sha256(sys.version.encode())
     for folder in PACKAGES.values():
