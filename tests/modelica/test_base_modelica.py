@@ -168,7 +168,7 @@ def test_a_tree_of_base_modelica_is_written():
 
 
 INSTANTS = """model M
-  Boolean up = time > 1;
+  Boolean up = time > 1.2;
   Integer whole = integer(time), n(start=0), changes(start=0), first(start=0);
 equation
   when sample(0, 0.5) and up then
