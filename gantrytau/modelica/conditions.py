@@ -1,6 +1,6 @@
 """Conditions of `when` as they stand in a text, and what is asked for before an instant."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from gantrytau.modelica import tree
@@ -8,6 +8,11 @@ from gantrytau.modelica.references import dotted, nodes_of, references
 
 BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
+AT_START = "initial"  # a keyword, which no component has as its name
+BEHIND, TURN = (
+    "before_",
+    "turn_",
+)  # and a variable: its value before an instant, and the parity of its changes
 
 
 def is_call(e: tree.Expression, name: str) -> bool:
@@ -28,6 +33,15 @@ def instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expre
             if is_call(one, "sample") or is_call(one, "edge"):
                 return one, other
     return test, None
+
+
+def guarded_samples(whens: Iterable[tree.Branching]) -> Iterator[tree.Call]:
+    """The calls of `sample` beside another condition, by `and`, in a `when` with `elsewhen`."""
+    for item in whens:
+        pairs = [instant_and_rest(test) for test, _ in item.branches] if len(item.branches) > 1 else []
+        for instant, rest in pairs:
+            if rest is not None and isinstance(instant, tree.Call) and is_call(instant, "sample"):
+                yield instant
 
 
 def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
@@ -107,3 +121,15 @@ def gives_value_before(item: tree.EquationOrStatement) -> bool:
         and isinstance(item.left, tree.Call)
         and is_call(item.left, "pre")
     )
+
+
+def followed_name(kind: str, name: str) -> str:
+    """The name of a Discrete that follows a variable."""
+    return kind + name.replace(".", "_")
+
+
+def sample_name(call: tree.Expression) -> str:
+    """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
+    assert isinstance(call, tree.Call)
+    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
+    return f"{kind}_{call.at}" if call.arguments else AT_START

@@ -14,26 +14,24 @@ from gantrytau.language.model import Connector, Declared, Model, Outer
 from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
+    AT_START,
+    BEHIND,
+    TURN,
     calls_before,
     changed_in,
     checks_in,
     first_valued,
+    followed_name,
     gives_value_before,
+    guarded_samples,
     instants,
     sample_calls,
+    sample_name,
     targets,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
-from gantrytau.modelica.elaboration.placed import (
-    AT_START,
-    BEFORE,
-    TURN,
-    Bound,
-    PlacedMembers,
-    followed_name,
-    sample_name,
-)
+from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
@@ -44,6 +42,8 @@ from gantrytau.modelica.elaboration.statements import (
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.elaboration.whens import at_start, follows
 from gantrytau.modelica.references import dotted, nodes_of
+
+TAKEN = "a name that is taken, expected another name"
 
 
 class TextClass(Declared):
@@ -90,7 +90,7 @@ class ModelicaModel(TextClass, Model):
         if AT_START in type(self).members():
             yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
         for name in _followed(self.structure):
-            old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEFORE, TURN))
+            old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
             yield follows(reduce(getattr, name.split("."), self), old, turn)
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
@@ -143,7 +143,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         if name in kind._taken or name.startswith("_"):
             scope.refuse(
                 one.element.declaration.at,
-                f"found a component '{name}', a name that is taken, expected another name",
+                f"found a component '{name}', {TAKEN}",
             )
         if not one.present or one.is_object:
             body[name] = None
@@ -158,9 +158,14 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
         start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
         body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
-    for name in _followed(structure):
-        body[followed_name(BEFORE, name)] = Discrete(0, description=f"{name} before an instant")
+    body["_followed"] = (*_followed(structure), *map(sample_name, guarded_samples(_whens(structure))))
+    for name in body["_followed"]:
         body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
+    for name in _followed(structure):
+        body[followed_name(BEHIND, name)] = Discrete(0, description=f"{name} before an instant")
+    taken = next((n for n in structure.members if isinstance(body.get(n), Discrete) and n not in held), None)
+    if taken is not None:
+        scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
     for call in (
         call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
     ):

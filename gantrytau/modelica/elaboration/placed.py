@@ -11,28 +11,12 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete, Formula
 from gantrytau.language.model import Declared
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.statements import AbsentComponent
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
-
-AT_START = "initial"  # a keyword, which no component has as its name
-BEFORE, TURN = (
-    "before_",
-    "turn_",
-)  # and a variable: its value before an instant, and the parity of its changes
-
-
-def followed_name(kind: str, name: str) -> str:
-    """The name of a Discrete that follows a variable."""
-    return kind + name.replace(".", "_")
-
-
-def sample_name(call: tree.Call) -> str:
-    """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
-    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
-    return f"{kind}_{call.at}" if call.arguments else AT_START
 
 
 class PlacedMembers:
@@ -78,10 +62,14 @@ class PlacedMembers:
 
     def before(self, name: str, asked: str) -> Any:
         own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
-        return None if own else getattr(self.instance, followed_name(BEFORE, name), None)
+        return None if own else self._following(BEHIND, name)
 
     def turn(self, name: str) -> Any:
-        return getattr(self.instance, followed_name(TURN, name), None)
+        return self._following(TURN, name)
+
+    def _following(self, kind: str, name: str) -> Any:
+        known = getattr(type(self.instance), "_followed", ())
+        return getattr(self.instance, followed_name(kind, name)) if name in known else None
 
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)

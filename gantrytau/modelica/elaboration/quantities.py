@@ -19,10 +19,12 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import is_call
 from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
 NUMBERS = ("start", "min", "max", "nominal")
@@ -68,7 +70,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
         return
     words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
     kind = next((made for word, made in KINDS.items() if word in words_of), Real)
-    if is_free(one):
+    if is_free(one) and not _is_differentiated(one):
         kind = Input
     elif kind is Input and inside_optimization(structure):
         kind = Real  # which the equations around it determine
@@ -76,6 +78,13 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
     body[name] = found
+
+
+def _is_differentiated(one: ClassMember) -> bool:
+    """Whether its derivative stands in the equations of its class: a free state is one whose start is free."""
+    nodes = (node for section in one.owner.scope.sections for node in nodes_of(section.items))
+    calls = (node for node in nodes if isinstance(node, tree.Call) and is_call(node, "der"))
+    return any(x.parts[0][0] == one.name for call in calls for x in references(call.arguments))
 
 
 def _flag(one: ClassMember, name: str) -> bool:

@@ -19,6 +19,7 @@ from gantrytau.modelica.conditions import (
     instant_and_rest,
     is_call,
     sample_calls,
+    sample_name,
 )
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, changed
@@ -39,6 +40,8 @@ def when_chains(
         first = at_start((instant == reader.value(call.arguments[0]),))
         known = reader.members.is_fixed(call.arguments[0])
         yield WhenChain((advance,) if known else (first, advance))
+        if (turn := reader.members.turn(sample_name(call))) is not None:
+            yield WhenChain((replace(advance, actions=(turn == 1 - pre(turn),)),))
     for call in (call for _, items in item.branches for call in checks_in(items)):
         words, flag = (
             reader.value(call.arguments[-1 if is_call(call, "terminate") else 1]),
@@ -66,10 +69,8 @@ def _branches(
             own = tuple(chosen_actions(before, others, own))
         found = list(_happenings(test if rest is None else instant, items, inner, own))
         (plain if rest is None else guarded).append(found)
-        if rest is not None and is_call(instant, "sample"):
-            call = cast(tree.Call, instant)
-            early = ROUNDING * inner.value(call.arguments[1])
-            guards.append((logic_and(time >= pre(inner.members.next_sample(call)) - early, now), actions))
+        if rest is not None and (turn := inner.members.turn(sample_name(instant))) is not None:
+            guards.append((logic_and((turn - pre(turn)) ** 2 > 0.5, now), actions))
     for branch in (*plain, *reversed(guarded)):
         yield from branch
 
