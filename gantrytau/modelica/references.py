@@ -20,6 +20,12 @@ def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
             yield from nodes_of(getattr(expression, name))
 
 
+def dotted(e: Any) -> str:
+    """The name of a reference without subscripts, with dots; "" for another expression."""
+    named = isinstance(e, tree.ComponentReference) and not any(subscripts for _, subscripts in e.parts)
+    return ".".join(name for name, _ in e.parts) if named else ""
+
+
 def references(expression: Any) -> list[tree.ComponentReference]:
     """The references in an expression, but for names of functions."""
     return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]

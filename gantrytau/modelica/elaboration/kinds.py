@@ -115,6 +115,8 @@ def _type_of_call(e: tree.Call, reader: Interpreter) -> str:
         return type_of(e.arguments[OF_ARGUMENT[name]], reader)
     elements = function.elements if function is not None else {}
     outputs = [n for n, one in elements.items() if "output" in one.clause.prefixes]
+    for one in () if e.iterators else (*e.arguments, *(value for _, value in e.named)):
+        type_of(one, reader)  # what stands in it is told here
     if function is None or not outputs:
         return ""
     first = tree.ComponentReference(e.at, ((outputs[0], ()),))

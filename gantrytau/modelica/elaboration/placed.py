@@ -1,13 +1,14 @@
 """Instances with symbols, and values of Modelica text that are computed in them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.declarations import Formula
+from gantrytau.language.declarations import Discrete, Formula
 from gantrytau.language.model import Declared
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
@@ -17,11 +18,21 @@ from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
 
 AT_START = "initial"  # a keyword, which no component has as its name
+BEFORE, TURN = (
+    "before_",
+    "turn_",
+)  # and a variable: its value before an instant, and the parity of its changes
+
+
+def followed_name(kind: str, name: str) -> str:
+    """The name of a Discrete that follows a variable."""
+    return kind + name.replace(".", "_")
 
 
 def sample_name(call: tree.Call) -> str:
-    """The name of the Discrete that holds the next instant of a `sample`, or whether it is the start."""
-    return f"next_sample_{call.at}" if call.arguments else AT_START
+    """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
+    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
+    return f"{kind}_{call.at}" if call.arguments else AT_START
 
 
 class PlacedMembers:
@@ -65,6 +76,13 @@ class PlacedMembers:
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
+    def before(self, name: str, asked: str) -> Any:
+        own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
+        return None if own else getattr(self.instance, followed_name(BEFORE, name), None)
+
+    def turn(self, name: str) -> Any:
+        return getattr(self.instance, followed_name(TURN, name), None)
+
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)
         if not hasattr(self.instance, name):
@@ -90,7 +108,8 @@ class Bound(Formula):
         if isinstance(found, tree.TreeNode):
             placed = PlacedMembers(scope, self.structure)
             try:
-                found = self.structure.interpreter(self.modifier.scope, placed).value(found)
+                reader = self.structure.interpreter(self.modifier.scope, placed)
+                found = replace(reader, settled=True).value(found)
             except AbsentComponent as error:
                 self.modifier.scope.refuse(self.modifier.at, f"found {error}, expected one that is there")
         found = self.modifier.picked(found)

@@ -68,6 +68,12 @@ class Structure:
     def next_sample(self, call: tree.Call) -> Any:
         raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
 
+    def before(self, name: str, asked: str) -> Any:
+        return None
+
+    def turn(self, name: str) -> Any:
+        return None
+
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
         return Interpreter(scope, members or self, self.beyond)
@@ -158,11 +164,11 @@ class Structure:
                 self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
     def type_of(self, reference: tree.ComponentReference) -> str:
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         return "" if one is None else one.type_name
 
     def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
             return None
         said = [one.full.inner.get(name) for name in ("min", "max")]
@@ -178,10 +184,10 @@ class Structure:
         """Whether a reference leads to a parameter or constant."""
         if not self.has(reference.parts[0][0]):
             return reference.parts[0][0] != "time"
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         return one is None or one.is_parameter
 
-    def _leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
+    def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
         here: Structure | None = self
         for name, _ in reference.parts:

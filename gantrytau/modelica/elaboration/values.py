@@ -178,6 +178,7 @@ ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "./": _spread(operator.truediv),
     ".^": _spread(operator.pow),
 }
+LOGICAL = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT)
 RELATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "<>": operator.ne,
 }  # fmt: skip
@@ -211,8 +212,8 @@ def unary(sign: str, a: Any) -> Any:
 
 def condition(value: Any) -> Any:
     """A Boolean as a condition: a variable that is no Discrete is true above one half."""
-    symbolic = isinstance(value, ca.SX) and value.is_symbolic()
-    return value > 0.5 if symbolic else value
+    number = isinstance(value, ca.SX) and not any(map(value.is_op, LOGICAL))
+    return value > 0.5 if number else value
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
