@@ -98,3 +98,12 @@ def first_valued(item: tree.EquationOrStatement) -> str:
     if isinstance(left, tree.Call) and is_call(left, "pre"):
         (left,) = left.arguments
     return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
+
+
+def gives_value_before(item: tree.EquationOrStatement) -> bool:
+    """Whether it is an initial equation of `pre(x)`, which says nothing of an x that nothing asks for before an instant."""
+    return (
+        isinstance(item, tree.SimpleEquation)
+        and isinstance(item.left, tree.Call)
+        and is_call(item.left, "pre")
+    )

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+import scipy.io
 
-from gantrytau import SolveError, load_modelica, simulate
+from gantrytau import ModelError, SolveError, load_modelica, simulate
 
 STICKING = """model M "unit mass on dry friction of 2 N, pushed by 3 N behind 2 s"
   Real v(start=1, fixed=true), a, sa, f;
@@ -27,7 +28,7 @@ def test_friction_by_a_mode_that_remembers_sticks_and_breaks_away(tmp_path):
     np.testing.assert_allclose(found.at(np.array([0.25, 1.0, 1.9, 3.0]), "v"), [0.5, 0, 0, 1], atol=1e-6)
 
 
-TABLE = """type Smoothness = enumeration(LinearSegments, ConstantSegments);
+TABLE = """type Smoothness = enumeration(LinearSegments, ContinuousDerivative, ConstantSegments);
 type Extrapolation = enumeration(HoldLastPoint, LastTwoPoints, Periodic);
 class Held
   extends ExternalObject;
@@ -38,6 +39,8 @@ class Held
     input Integer columns[:];
     input Smoothness smoothness;
     input Extrapolation extrapolation;
+    input String delimiter = ",";
+    input Integer nHeaderLines = 1;
     output Held held;
     external "C" held = ModelicaStandardTables_CombiTable1D_init3(fileName, tableName, table);
   end constructor;
@@ -59,7 +62,8 @@ model M
   parameter Smoothness smoothness = Smoothness.LinearSegments;
   parameter Extrapolation beyond = Extrapolation.HoldLastPoint;
   parameter String file = if false and unknown("") then "file" else "NoName";
-  parameter Held held = Held("NoName", file, numbers, {2, 3}, smoothness, beyond);
+  parameter String name = "NoName";
+  parameter Held held = Held(name, file, numbers, {2, 3}, smoothness, beyond);
   Real y = value(held, 1, time);
 end M;
 """
@@ -70,6 +74,8 @@ end M;
     [
         ("LinearSegments", "HoldLastPoint", [1, 4, 4, 4]),
         ("ConstantSegments", "HoldLastPoint", [0, 4, 4, 4]),
+        ("ConstantSegments", "LastTwoPoints", [0, 4, 4, 4]),
+        ("LinearSegments", "LastTwoPoints", [1, 4, 4, 4]),
         ("LinearSegments", "Periodic", [1, 4, 1, 4]),
     ],
 )
@@ -78,6 +84,33 @@ def test_tables_are_read_by_external_functions(smoothness, beyond, wanted, tmp_p
     model = load_modelica(tmp_path / "table.mo")["M"](smoothness=smoothness, beyond=beyond)
     found = simulate(model, stop=4.0)
     np.testing.assert_allclose(found.at(np.array([0.5, 1.5, 2.5, 3.5]), "y"), wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("ending", ["txt", "csv", "mat"])
+def test_tables_of_files_are_those_of_the_model(ending, tmp_path):
+    numbers, file = np.array([[0, 4.0], [1, 6.0], [3, 8.0], [4, 8.0]]), tmp_path / f"points.{ending}"
+    if ending == "mat":
+        scipy.io.savemat(file, {"of": {"points": numbers}})
+    else:
+        head = "#1\ndouble other(1,2) # first\n7 8\ndouble points(4,2) # second" if ending == "txt" else "x,y"
+        between = "\t" if ending == "txt" else ","
+        np.savetxt(file, numbers, header=head, comments="", delimiter=between)
+    (tmp_path / "table.mo").write_text(TABLE.replace("{1, 4, 7}, {2, 4, 8}", "{3, 4, 7}, {4, 4, 8}"))
+    made = load_modelica(tmp_path / "table.mo")["M"]
+    found, wanted = (
+        simulate(made(smoothness="ContinuousDerivative", **said), stop=4.0)
+        for said in ({"file": str(file), "name": "of.points" if ending == "mat" else "points"}, {})
+    )
+    np.testing.assert_allclose(found["y"], wanted["y"] + 4, rtol=0, atol=1e-14)
+
+
+def test_a_table_that_a_file_has_not_is_refused_with_the_file(tmp_path):
+    (tmp_path / "points.txt").write_text("#1\ndouble points(1,2)\n7 8\n")
+    (tmp_path / "table.mo").write_text(TABLE)
+    made = load_modelica(tmp_path / "table.mo")["M"]
+    for file, words in (("points.txt", "no matrix 'point'"), ("none.txt", "no file of a table")):
+        with pytest.raises(ModelError, match=words):
+            simulate(made(file=str(tmp_path / file), name="point"), stop=1.0)
 
 
 TOGETHER = """model M

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -17,7 +18,7 @@ from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
-from gantrytau.modelica.table_functions import external_value
+from gantrytau.modelica.external.functions import check_known, external_value
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -30,12 +31,13 @@ class LeftBlock(Exception):
 class Execution:
     """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before.
 
-    shapes: the sizes of what is declared with sizes.
+    shapes: the sizes of what is declared with sizes; left: by `break` and `return`, whether what follows is left out.
     """
 
     reader: Interpreter
     known: dict[str, Any] = field(default_factory=dict)
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    left: dict[str, Any] = field(default_factory=lambda: {"break": False, "return": False})
 
     def run(self, items: Items, local: Mapping[str, Any] | None = None) -> None:
         """Carry out statements, one after another; local: values of the iterators around them."""
@@ -89,7 +91,10 @@ class Execution:
                 try:
                     if target.parts == ((name, ()),):
                         self._check_shape(name, one)
-                    self.known[name] = _with(self.known[name], target.parts, one, reader)
+                    found = _with(self.known[name], target.parts, one, reader)
+                    for gone in self.left.values():
+                        found = found if gone is False else _chosen(gone, self.known[name], found, name)
+                    self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
 
@@ -134,6 +139,7 @@ class Execution:
                 self._check_shape(name, value)
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        outer = self.left["break"]
         for inner in looped(item, reader):
             steps = {name: inner.local[name] for name, _ in item.iterators}
             try:
@@ -142,6 +148,7 @@ class Execution:
                 if str(left) == "return":
                     raise
                 break
+        self.left["break"] = outer
 
     def _while(self, item: tree.WhileLoop, local: Mapping[str, Any]) -> None:
         for _ in range(MOST_ROUNDS):
@@ -168,19 +175,29 @@ class Execution:
         if not tests:
             self.run(last, local)
             return
-        before = self.known
+        before, gone = self.known, self.left
+        self._carry_out(last, local, before, gone)
+        for test, items in reversed(tests):
+            other, left = self.known, self.left
+            self._carry_out(items, local, before, gone)
+            self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
+            self.left = {word: _chosen(test, one, left[word], word) for word, one in self.left.items()}
+        for word in (word for word, one in self.left.items() if one is True):
+            self.left = gone
+            raise LeftBlock(word)
+
+    def _carry_out(
+        self, items: Items, local: Mapping[str, Any], known: Mapping[str, Any], gone: Mapping[str, Any]
+    ) -> None:
+        """Carry out a branch from the values before it."""
+        self.known, self.left = dict(known), dict(gone)
         try:
-            self.known = dict(before)
-            self.run(last, local)
-            for test, items in reversed(tests):
-                other, self.known = self.known, dict(before)
-                self.run(items, local)
-                self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
+            self.run(items, local)
         except LeftBlock as left:
-            reader.scope.refuse(
-                item.at,
-                f"found '{left}' where the condition varies, expected a known one",
+            here = reduce(
+                lambda a, b: values.binary("and", a, values.unary("not", b)), self.left.values(), True
             )
+            self.left[str(left)] = values.binary("or", self.left[str(left)], here)
 
 
 def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
@@ -284,10 +301,7 @@ def called_class(
     if record:
         return RecordValue(run.known)
     if external is not None:
-        reader = replace(run.reader, local=run.known)
-        return external_value(
-            external.function or definition.name, [reader.value(e) for e in external.arguments]
-        )
+        return _external(scope, external, run)
     try:
         for section in scope.sections:
             run.reader = replace(run.reader, scope=section.scope)
@@ -300,6 +314,20 @@ def called_class(
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
     return found if len(found) != 1 else first_result(found)
+
+
+def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:
+    """The value of an external function, whose outputs may stand among the arguments."""
+    name = external.function or scope.definition.name
+    check_known(name)
+    outputs = {n for n, e in scope.elements.items() if "output" in e.clause.prefixes}
+    reader = replace(run.reader, local=run.known)
+    given = [e for e in external.arguments if not _names_one(e, outputs)]
+    return external_value(name, [reader.value(e) for e in given], scope.root.inherited_class)
+
+
+def _names_one(e: tree.Expression, names: Collection[str]) -> bool:
+    return isinstance(e, tree.ComponentReference) and e.parts[0][0] in names
 
 
 def _is_open(value: Any) -> bool:

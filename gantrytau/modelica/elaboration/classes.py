@@ -18,6 +18,7 @@ from gantrytau.modelica.conditions import (
     changed_in,
     checks_in,
     first_valued,
+    gives_value_before,
     instants,
     sample_calls,
     targets,
@@ -347,7 +348,9 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         items = [one for one in section.items if not any(one is other for other in structure.started)]
         if starts and not steps:
             items = (
-                [i for i in items if first_valued(i) not in held] if initial else _set_by_whens(items, held)
+                [i for i in items if first_valued(i) not in held and not gives_value_before(i)]
+                if initial
+                else _set_by_whens(items, held)
             )
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue

@@ -289,6 +289,8 @@ class Interpreter:
         )
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
+        if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
+            return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
             (place,) = places
@@ -296,6 +298,27 @@ class Interpreter:
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value
+
+    def _varies(self, subscript: tree.Expression, size: int) -> bool:
+        """Whether a subscript is known while a model runs only."""
+        if isinstance(subscript, (tree.Mark, tree.Number)):
+            return False
+        found = replace(self, end=size).value(subscript)
+        return isinstance(found, ca.SX) and not found.is_constant()
+
+    def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
+        """The elements of an array at places of which some vary, the last one beyond all."""
+        (first, *rest), size = subscripts, len(value)
+        if not self._varies(first, size):
+            chosen = self.places(first, size)
+            each = [self.indexed(value[k], rest) for k in ([chosen] if isinstance(chosen, int) else chosen)]
+            return each[0] if isinstance(chosen, int) else values.array(each)
+        place = replace(self, end=size).value(first)
+        each = [self.indexed(one, rest) for one in value]
+        found = each[-1]
+        for k in reversed(range(size - 1)):
+            found = values.chosen(place < k + 1.5, each[k], found, self.quiet)
+        return found
 
     def places(self, subscript: tree.Expression, size: int) -> int | list[int]:
         """Indices from 0 that a subscript chooses of so many; ModelError beyond."""

@@ -1,6 +1,6 @@
 """Equations of Modelica as the statements that `equations(self)` yields (Modelica 3.6, chapter 8)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard, cast
 
@@ -204,6 +204,7 @@ def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     if not tests:
         yield from stated(last, reader)
         return
+    yield from _guarded_asserts(tests, last, reader)
     found = _differences(last, reader)
     for test, items in reversed(tests):
         above = _differences(items, reader)
@@ -217,10 +218,24 @@ def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
         yield one == 0
 
 
+def _guarded_asserts(tests: Sequence[tuple[Any, Items]], last: Items, reader: Interpreter) -> Iterator[Any]:
+    """The assertions of branches, each where its condition holds and none before it."""
+    before: Any = False
+    for test, items in (*tests, (True, last)):
+        here = values.binary("and", values.unary("not", before), values.condition(test))
+        for item in filter(_is_assert, items):
+            yield from _call(cast(tree.ProcedureCall, item), reader, here)
+        before = values.binary("or", before, values.condition(test))
+
+
+def _is_assert(item: tree.EquationOrStatement) -> bool:
+    return isinstance(item, tree.ProcedureCall) and item.call.function.parts[-1][0] == "assert"
+
+
 def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     """The scalar equations of a branch as differences of their sides."""
     found: list[ca.SX] = []
-    for one in stated(items, reader):
+    for one in stated([item for item in items if not _is_assert(item)], reader):
         if not isinstance(one, ca.SX):
             raise ModelError(
                 "found connect, when or assert under a condition that varies, expected equations"
@@ -229,7 +244,8 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     return found
 
 
-def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
+def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> Iterator[Any]:
+    """The assertion that a call states; where: a condition under which it is asked for."""
     name = item.call.function.parts[-1][0]
     if name != "assert":
         raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")
@@ -239,8 +255,10 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
     if not _is_error(item.call, reader):
         return
     holds, words = reader.value(arguments["condition"]), reader.value(arguments["message"])
+    if where is not True:
+        holds = values.binary("or", values.unary("not", where), values.condition(holds))
     if isinstance(holds, ca.SX):
-        if reader.members.is_fixed(arguments["condition"]):
+        if where is True and reader.members.is_fixed(arguments["condition"]):
             yield require(holds, words)
         else:
             yield WhenChain((Happening(logic_not(values.condition(holds)), (), words, True, words),))
