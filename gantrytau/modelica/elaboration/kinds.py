@@ -10,7 +10,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
 
 BOOLEANS = frozenset({"edge", "change", "initial", "terminal", "sample"})
-INTEGERS = frozenset({"size", "ndims", "integer", "Integer"})
+INTEGERS = frozenset({"size", "ndims", "integer", "Integer", "cardinality"})
 OF_ARGUMENT = {"pre": 0, "noEvent": 0, "smooth": 1, "homotopy": 0, "delay": 0, "abs": 0, "sum": 0, "fill": 0}
 
 

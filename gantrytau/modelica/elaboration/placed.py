@@ -1,5 +1,6 @@
 """Instances with symbols, and values of Modelica text that are computed in them."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,14 +10,16 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete, Formula
-from gantrytau.language.model import Declared
+from gantrytau.language.model import Connector, Declared
+from gantrytau.language.statements import Connection
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
-from gantrytau.modelica.elaboration.statements import AbsentComponent
+from gantrytau.modelica.elaboration.statements import AbsentComponent, stated
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
+from gantrytau.modelica.references import connects_in
 
 
 class PlacedMembers:
@@ -76,6 +79,37 @@ class PlacedMembers:
         if not hasattr(self.instance, name):
             raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
         return getattr(self.instance, name)
+
+    def cardinality(self) -> int:
+        """The number of connections of a connector, on both sides of the component that has it."""
+        owner = self.instance
+        while isinstance(owner, Connector):
+            owner = around(owner)
+        both = (owner, around(owner))
+        return sum(_connected(one)[id(self.instance)] for one in both if one is not None)
+
+
+def around(member: Any) -> Any:
+    """The component of which an instance is a member; None for the outermost."""
+    found = vars(member).get("_around")
+    return found and found()
+
+
+def _connected(component: Any) -> Counter[int]:
+    """The number of connections that a component states of each connector, by the connector's id."""
+    if "_connected" not in vars(component):
+        structure: Structure | None = getattr(type(component), "structure", None)
+        if structure is None:
+            found = [one for one in component.equations() if isinstance(one, Connection)]
+        else:
+            members = PlacedMembers(component)
+            sections = (one for one in structure.scope.sections if one.kind == "equation")
+            readers = (
+                (connects_in(one.items), structure.interpreter(one.scope, members)) for one in sections
+            )
+            found = [one for items, reader in readers for one in stated(items, reader)]
+        component._connected = Counter(id(end) for one in found for end in (one.a, one.b))
+    return component._connected
 
 
 def _by_size(found: ca.SX) -> Any:

@@ -295,6 +295,14 @@ def _differentiated(x: Any) -> Any:
 
 
 PLAIN = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "sign")
+
+
+def _cardinality(connector: Any) -> int:
+    if not hasattr(connector, "cardinality"):
+        raise ModelError("found cardinality() of what is no connector, expected a connector with members")
+    return connector.cardinality()
+
+
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     **{name: _elementwise(getattr(ca, name)) for name in PLAIN},
     "log10": _elementwise(ca.log10),
@@ -338,12 +346,12 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "semiLinear": lambda x, above, below: if_else(x >= 0, above * x, below * x),
     "Integer": lambda value: value if isinstance(value, ca.SX) else int(value),
     "String": _written,
+    "cardinality": _cardinality,
 }  # fmt: skip
 REFUSED: Mapping[str, str] = {
     "inStream": "write a connector with flow and potential variables",
     "actualStream": "write a connector with flow and potential variables",
     "spatialDistribution": "write a chain of volumes",
-    "cardinality": "give a Boolean parameter that says whether something is connected",
     "terminal": "leave out what is done at the end",
     "getInstanceName": "write the text itself",
 }

@@ -23,6 +23,7 @@ from gantrytau.modelica.conditions import (
 )
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, changed
+from gantrytau.modelica.elaboration.kinds import type_of
 
 ROUNDING = 1e-6  # of a period, by which an instant may be located early
 
@@ -84,13 +85,25 @@ def _happenings(
             yield at_start(actions)
             continue
         edge = cast(tree.Call, one).arguments[0] if is_call(one, "edge") else one
-        found = values.condition(reader.value(edge))
+        found = values.condition(_stays(edge, reader))
         if isinstance(found, ca.SX):
             refuse_change(found)
         sampled = any(sample_calls(one))
         turns = map(reader.members.turn, sorted(set(changed_in(one, items))))
         for each in _both(found, [turn for turn in turns if turn is not None]):
             yield Happening(each, actions, "sample" if sampled else "", sampled)
+
+
+def _stays(test: tree.Expression, reader: Interpreter) -> Any:
+    """A condition; of Integers, Booleans or literals that are equal or differ as a range, in which they stay for a while."""
+    found = reader.value(test)
+    if not (isinstance(test, tree.Binary) and test.operator in ("==", "<>") and isinstance(found, ca.SX)):
+        return found
+    if "Real" in (type_of(test.left, reader), type_of(test.right, reader)):
+        return found
+    left, right = (values.to_casadi(reader.value(one)) for one in (test.left, test.right))
+    within = logic_and(left > right - 0.5, left < right + 0.5)
+    return within if test.operator == "==" else logic_not(within)
 
 
 def at_start(actions: tuple[Any, ...]) -> Happening:
