@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.border.checks import array, number, one_of, whole
+from gantrytau.border.checks import array, instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
@@ -75,9 +75,10 @@ class Mpc:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages = _staged(problem, self.period)
         self.name = self.built.read.name
-        soft = self._soft(hard)
+        self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, weight)
+        finite = np.isfinite(self._stages.rows)
+        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
         self._terminal = Terminal(self._stages, self.elements * self.period)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
@@ -237,6 +238,9 @@ class Mpc:
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
         flat, found = self.built.read.dae.flat, {}
+        instance(
+            self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
+        )
         for name, value in measured.items():
             elements = flat.expand(name)
             unknown = [one for one in elements if one not in self.states]
@@ -297,7 +301,7 @@ class Mpc:
 
     def _passed(self, found: Found) -> tuple[str, ...]:
         """Words of the soft limits, where the plan passes one."""
-        passed = zip(self._stages.row_names, self._program.soft & np.any(found.slack > 1e-6), strict=True)
+        passed = zip(self._stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 
