@@ -133,6 +133,7 @@ def test_pages_of_trees_are_there():
         *dict(thesis_pages({})),
         "command_line/index.md",
         "sources/index.md",
+        "gallery/index.md",
     }
     index = (ROOT / "notebooks/site/index.md").read_text()
     for body in re.findall(r"```\{toctree\}\n(.*?)```", index, re.DOTALL):

@@ -8,8 +8,10 @@ import time
 
 from notebooks.site.builder.broken_links import broken_links
 from notebooks.site.builder.executed_notebooks import executed_notebooks
+from notebooks.site.builder.gallery.drawn_examples import drawn_examples
 from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import error_pages
+from notebooks.site.builder.generated.gallery_page import gallery_page
 from notebooks.site.builder.generated.reference_pages import reference_pages
 from notebooks.site.builder.generated.source_page import source_page
 from notebooks.site.builder.generated.thesis_page import pictures, thesis_pages
@@ -28,11 +30,16 @@ def main() -> int:
     begin = time.monotonic()
     stage = Stage()
     stage_handwritten(stage)
+    drawn = drawn_examples()
+    for name, one in drawn.items():
+        stage.copy(one.picture, f"gallery/{name}.png")
+    told(begin, f"{len(drawn)} examples drawn")
     single = {
+        "gallery/index.md": gallery_page(drawn),
         "command_line/index.md": command_page(),
         "sources/index.md": source_page(),
     }
-    for page, text in (*reference_pages(), *error_pages(), *single.items()):
+    for page, text in (*reference_pages(drawn), *error_pages(), *single.items()):
         stage.write(page, text)
     told(begin, f"{len(stage.written)} pages staged; calls of the thesis are executed")
     _stage_thesis(stage, asked.without_outputs)

@@ -37,6 +37,7 @@ GENERATED = (
     "thesis",
     "command_line",
     "sources",
+    "gallery",
 )  # folders of pages that nobody writes
 LINK = re.compile(  # or code, in which nothing is one
     r"^```.*?^```|(!?\[(?:`[^`\n]*`|[^\]`])*\]\()([^)\s]+)(\))|`[^`\n]+`", re.MULTILINE | re.DOTALL

@@ -1,7 +1,6 @@
 """Calls of the pages of the thesis, executed again when they have changed, or anything that they could call."""
 
 import ast
-import hashlib
 import json
 import math
 import sys
@@ -14,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from notebooks.site.builder.executed_notebooks import state_of_packages
+from notebooks.site.builder.executed_notebooks import state
 from notebooks.site.builder.places import EXECUTED, SOURCES
 
 FOLDER = EXECUTED / "thesis"
@@ -221,7 +220,7 @@ def _kept(stem: Path) -> Made:
 
 def _state(item: Item) -> str:
     code = "\0".join([BEGIN, *code_before(item).values(), item.call, *(one.here for one in item.printed)])
-    return hashlib.sha256(code.encode() + Path(__file__).read_bytes() + state_of_packages()).hexdigest()[:16]
+    return state(code.encode() + Path(__file__).read_bytes())
 
 
 def differences(item: Item, values: Sequence[float]) -> list[str]:
