@@ -58,9 +58,12 @@ def detect(
         np.full(shape[:2], "file", "U12"),
     )
     findings: list[Finding] = []
+    candidates: dict[tuple[int, int], Array] = {}
+    backgrounds: list[Array | None] = []
     for c, series in enumerate(cameras):
         still, few = _background(series, background if pattern.kind == "quincunx" else 0)
         findings += few
+        backgrounds.append(still)
         for k, file in enumerate(numbers):
             grey = series.load(file) if file in series.numbers else None
             if grey is None:
@@ -69,6 +72,7 @@ def detect(
                 seen = find_charuco(grey, pattern, normalise)
             else:
                 seen = find_quincunx(grey, pattern, still, normalise, up)
+                candidates[c, k] = seen.candidates
             steps[c, k] = seen.step
             if seen.edges is not None:
                 corners[c, k], sigma[c, k] = seen.edges.corners, seen.edges.sigma
@@ -76,7 +80,17 @@ def detect(
         findings += told_up(corners, sigma, up)
     findings += [finding for c, each in enumerate(steps) for finding in _lost(each, c)]
     size = np.array([series.size for series in cameras])
-    return Detections(pattern, corners, sigma, steps, size, np.array(numbers), tuple(findings))
+    return Detections(
+        pattern,
+        corners,
+        sigma,
+        steps,
+        size,
+        np.array(numbers),
+        tuple(findings),
+        candidates,
+        tuple(backgrounds),
+    )
 
 
 def _background(series: ImageSeries, count: int) -> tuple[Array | None, list[Finding]]:
