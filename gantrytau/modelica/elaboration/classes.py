@@ -18,6 +18,7 @@ from gantrytau.modelica.conditions import (
     BEHIND,
     TURN,
     calls_before,
+    chain_of,
     changed_in,
     checks_in,
     first_valued,
@@ -25,6 +26,7 @@ from gantrytau.modelica.conditions import (
     gives_value_before,
     guarded_samples,
     instants,
+    is_call,
     sample_calls,
     sample_name,
     targets,
@@ -213,9 +215,16 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
-            if name in held and isinstance(item, tree.SimpleEquation) and structure.is_fixed(item.right):
+            if not isinstance(item, tree.SimpleEquation):
+                continue
+            names = chain_of(name, structure.scope.sections) if dotted(item.left) else [name]
+            if is_call(item.right, "pre"):
+                if chain_of(dotted(cast(Any, item.right).arguments[0]), structure.scope.sections)[-1] == name:
+                    structure.started.append(item)  # holds by the equations between the two
+            elif names[-1] in held and structure.is_fixed(item.right):
                 structure.started.append(item)
-                yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
+                for one in filter(held.__contains__, names):
+                    yield one, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
 def _held(structure: Structure) -> Iterator[str]:

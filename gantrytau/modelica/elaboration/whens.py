@@ -88,6 +88,8 @@ def _happenings(
         found = values.condition(_stays(edge, reader))
         if isinstance(found, ca.SX):
             refuse_change(found)
+        elif found is False:
+            found = time < -1e30  # never
         sampled = any(sample_calls(one))
         turns = map(reader.members.turn, sorted(set(changed_in(one, items))))
         for each in _both(found, [turn for turn in turns if turn is not None]):
