@@ -151,3 +151,17 @@ def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
             return [name]
         found.append(other)
     return found if before else [name]
+
+
+def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:
+    """Equations, those of samples as a `when` that sets the Boolean at each instant and takes it back there."""
+    for item in items:
+        if not isinstance(item, tree.SimpleEquation) or not is_call(item.right, "sample"):
+            yield item
+            continue
+        at, name = item.at, item.left
+        on, off = (
+            tree.SimpleEquation(at, None, None, "=", name, tree.BooleanLiteral(at, true))
+            for true in (True, False)
+        )
+        yield tree.Branching(at, None, None, "when", ((item.right, (on,)), (name, (off,))), None)

@@ -42,12 +42,7 @@ def detect(
     """
     whole("detect", "background", background, least=0)
     up = number("detect", "up", up)
-    frames = images.frames if isinstance(images, Images) else images
-    if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
-        found = Given("images", images)
-        raise ModelError(
-            "expected a list with a folder or an array for each camera", place="detect", found=found
-        )
+    frames = _frames_of(images)
     instance("detect", "pattern", pattern, Pattern, "a Pattern, as Pattern.quincunx(0.06)")
     cameras = [image_series(each, f"camera {c + 1}") for c, each in enumerate(frames)]
     numbers = rows_of(cameras)
@@ -80,17 +75,19 @@ def detect(
         findings += told_up(corners, sigma, up)
     findings += [finding for c, each in enumerate(steps) for finding in _lost(each, c)]
     size = np.array([series.size for series in cameras])
-    return Detections(
-        pattern,
-        corners,
-        sigma,
-        steps,
-        size,
-        np.array(numbers),
-        tuple(findings),
-        candidates,
-        tuple(backgrounds),
-    )
+    seen_besides = candidates, tuple(backgrounds)
+    return Detections(pattern, corners, sigma, steps, size, np.array(numbers), tuple(findings), *seen_besides)
+
+
+def _frames_of(images: Images | Sequence[Any]) -> Sequence[Any]:
+    """The images of each camera; ModelError where there are none."""
+    frames = images.frames if isinstance(images, Images) else images
+    if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
+        found = Given("images", images)
+        raise ModelError(
+            "expected a list with a folder or an array for each camera", place="detect", found=found
+        )
+    return frames
 
 
 def _background(series: ImageSeries, count: int) -> tuple[Array | None, list[Finding]]:
