@@ -1,6 +1,7 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -8,13 +9,14 @@ import casadi as ca
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
-from gantrytau.language.events import WhenChain
+from gantrytau.language.events import Happening, WhenChain
+from gantrytau.language.functions import if_else
 from gantrytau.language.model import Connector, Declared, Model, Outer
-from gantrytau.language.symbols import der
+from gantrytau.language.symbols import der, pre
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
-from gantrytau.modelica.elaboration.placed import AT_START, Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.placed import AT_START, SAMPLE, Bound, PlacedMembers, sample_name
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
@@ -320,6 +322,9 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
+        reader = replace(
+            reader, settled=starts and not initial
+        )  # a value before the start is what is set there
         try:
             if starts and (steps or not initial):
                 named = set(assigned(items)) - held if initial else held.intersection(assigned(items))
@@ -352,4 +357,18 @@ def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
     names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
     scalars = (scalar for one in firsts for scalar in one.elements())
     own = tuple(one for one in scalars if one.dep(0).name() in names)
-    return WhenChain((at_start(own), *stated.branches)) if own else stated
+    sampled = next((one for one in stated.branches if one.words == "sample"), None)
+    first = tuple(_first_actions(own, sampled)) if own and sampled is not None else own
+    return WhenChain((at_start(first), *stated.branches)) if own else stated
+
+
+def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
+    """What is set at the start, and what a sample makes of it where its first instant is the start."""
+    given = {one.dep(0).name(): one for one in own}
+    instants = [one for one in ca.symvar(sampled.condition) if SAMPLE in one.name()]
+    first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
+    for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
+        left = scalar.dep(0)
+        before = given.pop(left.name()).dep(1) if left.name() in given else pre(left)
+        yield left == if_else(first, scalar.dep(1), before)
+    yield from given.values()

@@ -336,6 +336,8 @@ class Interpreter:
             return time >= self.members.next_sample(e)
         if self.settled and name in ("pre", "edge", "change"):
             return self.value(e.arguments[0]) if name == "pre" else False
+        if name == "getInstanceName":
+            return getattr(self.members, "structure", self.members).instance_name
         if name == "initial":
             return self.members.next_sample(e) > 0.5
         name, function = self.function(e)

@@ -16,12 +16,13 @@ from gantrytau.modelica.elaboration.statements import AbsentComponent
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
 
+SAMPLE = "next_sample_"  # begins the name of what holds the next instant of a `sample`
 AT_START = "initial"  # a keyword, which no component has as its name
 
 
 def sample_name(call: tree.Call) -> str:
     """The name of the Discrete that holds the next instant of a `sample`, or whether it is the start."""
-    return f"next_sample_{call.at}" if call.arguments else AT_START
+    return f"{SAMPLE}{call.at}" if call.arguments else AT_START
 
 
 class PlacedMembers:

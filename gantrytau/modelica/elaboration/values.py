@@ -344,7 +344,6 @@ REFUSED: Mapping[str, str] = {
     "spatialDistribution": "write a chain of volumes",
     "cardinality": "give a Boolean parameter that says whether something is connected",
     "terminal": "leave out what is done at the end",
-    "getInstanceName": "write the text itself",
 }
 
 
