@@ -5,9 +5,50 @@ from typing import Any
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import tree
-from gantrytau.modelica.references import nodes_of
+from gantrytau.modelica.references import nodes_of, references
 
 SIZES: Mapping[str, int] = {"zeros": 0, "ones": 0, "fill": 1, "identity": 0, "linspace": 2}
+
+
+def ask(
+    structure: Any, item: tree.EquationOrStatement, scope: Any, local: frozenset[str] = frozenset()
+) -> None:
+    """Fold the parameters of an instance that must be known in an equation or statement of a class."""
+    inside: list[tree.EquationOrStatement] = []
+    if isinstance(item, tree.ForLoop):
+        for name, over in item.iterators:
+            _ask_names(structure, over, scope, local)
+            local |= {name}
+        inside += item.items
+    elif isinstance(item, tree.Branching):
+        for test, items in item.branches:
+            if item.word == "if":
+                _ask_names(structure, test, scope, local)
+            inside += items
+        inside += item.otherwise or ()
+    else:
+        ask_for_shapes(structure, item, scope, local)
+    for one in inside:
+        ask(structure, one, scope, local)
+
+
+def ask_for_shapes(structure: Any, item: Any, scope: Any, local: frozenset[str] = frozenset()) -> None:
+    """Fold the parameters in ranges, subscripts, sizes and arguments of an expression."""
+    for one in shaping(item, scope, lambda around, call: structure.interpreter(around).function(call)[1]):
+        before = set(structure.read)
+        try:
+            _ask_names(structure, one, scope, local)
+        except ModelError:  # a value that an initial equation gives, or a fault told where it is computed
+            structure.read.intersection_update(before)
+
+
+def _ask_names(structure: Any, expression: Any, scope: Any, local: frozenset[str]) -> None:
+    """Fold the parameters in an expression, unless a variable stands in it, too."""
+    found = [one for one in references(expression) if one.parts[0][0] not in local]
+    if all(map(structure.is_known, found)):
+        for one in (one for one in found if structure.has(one.parts[0][0])):
+            whole = tuple((name, ()) for name, _ in one.parts)
+            structure.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
 
 Lookup = Callable[[Any, tree.Call], Any]  # the class of the function of a call in a class, or None

@@ -321,14 +321,16 @@ def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution
     """The value of an external function, whose outputs may stand among the arguments."""
     name = external.function or scope.definition.name
     check_known(name)
-    outputs = {n for n, e in scope.elements.items() if "output" in e.clause.prefixes}
-    reader = replace(run.reader, local=run.known)
-    given = [e for e in external.arguments if not _names_one(e, outputs)]
-    return external_value(name, [reader.value(e) for e in given], scope.root.inherited_class)
-
-
-def _names_one(e: tree.Expression, names: Collection[str]) -> bool:
-    return isinstance(e, tree.ComponentReference) and e.parts[0][0] in names
+    outputs = [n for n, e in scope.elements.items() if "output" in e.clause.prefixes]
+    reader, given, written = replace(run.reader, local=run.known), [], []
+    for e in external.arguments:
+        if isinstance(e, tree.ComponentReference) and e.parts[0][0] in outputs:
+            written.append(e.parts[0][0])
+        else:
+            given.append(reader.value(e))
+    found = external_value(name, given, scope.root.inherited_class)
+    several = dict(zip(written, found, strict=True)) if len(written) > 1 else {}
+    return tuple(several[n] for n in outputs) if several else found
 
 
 def _is_open(value: Any) -> bool:

@@ -1,6 +1,7 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast
@@ -367,6 +368,8 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
+        # a value before the start is what is set there
+        reader = replace(reader, settled=starts and not initial)
         try:
             if starts and (steps or not initial):
                 named = set(targets(items)) - held if initial else held.intersection(targets(items))

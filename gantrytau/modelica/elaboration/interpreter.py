@@ -314,6 +314,8 @@ class Interpreter:
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
+        if name == "getInstanceName":
+            return getattr(self.members, "structure", self.members).instance_name
         if name == "initial":
             return self.members.next_sample(e) > 0.5
         if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):

@@ -18,7 +18,7 @@ from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, 
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
 from gantrytau.modelica.references import references
-from gantrytau.modelica.shaping import shaping
+from gantrytau.modelica.shaping import ask, ask_for_shapes
 
 
 @dataclass(eq=False)
@@ -65,6 +65,14 @@ class Structure:
         one = self.members[name]
         return tuple(one.first_sizes) or one.shape
 
+    @property
+    def instance_name(self) -> str:
+        """Its path behind the name of the whole model."""
+        root = self
+        while root.around is not None:
+            root = root.around
+        return f"{root.scope.definition.name}.{self.path}".rstrip(".")
+
     def next_sample(self, call: tree.Call) -> Any:
         raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
 
@@ -87,9 +95,7 @@ class Structure:
 
     def _refused(self, said: Modifier, words: str) -> ModelError:
         """The error of a modification, with its line where it stands in a text."""
-        return (
-            TextError(said.scope.source.told(said.at, words)) if said.scope is not None else ModelError(words)
-        )
+        return TextError(said.scope.source.told(said.at, words)) if said.scope else ModelError(words)
 
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
@@ -101,9 +107,8 @@ class Structure:
         if not one.is_parameter:
             raise ModelError(f"found the variable '{name}', expected what is known at translation")
         if one.full.value is None:
-            raise ModelError(
-                f"found '{name}', which has no value, expected one, as it shapes {self.scope.name}; give {name} = ..."
-            )
+            words = f"found '{name}', which has no value, expected one, as it shapes {self.scope.name}"
+            raise ModelError(f"{words}; give {name} = ...")
         if name in self.folding:
             raise ModelError(f"found '{name}', whose value needs itself, expected values one after another")
         self.read.add(name)
@@ -130,7 +135,7 @@ class Structure:
         self.scope.check_replaced()
         for one in self.members.values():
             if isinstance(one.full.value, tree.TreeNode) and one.present:
-                (one.full.node or self)._ask_shapes(one.full.value, one.full.scope)
+                ask_for_shapes(one.full.node or self, one.full.value, one.full.scope)
             if one.present and one.is_object:
                 self.member(one.name)
             elif one.present and one.shape is not None:
@@ -138,37 +143,7 @@ class Structure:
                     child.prepare()
         for section in self.scope.sections:
             for item in section.items:
-                self._ask(item, section.scope, frozenset())
-
-    def _ask(self, item: tree.EquationOrStatement, scope: ClassScope, local: frozenset[str]) -> None:
-        inside: list[tree.EquationOrStatement] = []
-        if isinstance(item, tree.ForLoop):
-            for name, over in item.iterators:
-                self._ask_names(over, scope, local)
-                local |= {name}
-            inside += item.items
-        elif isinstance(item, tree.Branching):
-            for test, items in item.branches:
-                if item.word == "if":
-                    self._ask_names(test, scope, local)
-                inside += items
-            inside += item.otherwise or ()
-        else:
-            self._ask_shapes(item, scope, local)
-        for one in inside:
-            self._ask(one, scope, local)
-
-    def _ask_shapes(self, item: Any, scope: ClassScope, local: frozenset[str] = frozenset()) -> None:
-        for one in shaping(item, scope, lambda around, call: self.interpreter(around).function(call)[1]):
-            self._ask_names(one, scope, local)
-
-    def _ask_names(self, expression: Any, scope: ClassScope, local: frozenset[str]) -> None:
-        """Fold the parameters in an expression, unless a variable stands in it, too."""
-        found = [one for one in references(expression) if one.parts[0][0] not in local]
-        if all(map(self._is_known, found)):
-            for one in (one for one in found if self.has(one.parts[0][0])):
-                whole = tuple((name, ()) for name, _ in one.parts)
-                self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
+                ask(self, item, section.scope)
 
     def type_of(self, reference: tree.ComponentReference) -> str:
         one = self.leaf(reference)
@@ -185,9 +160,9 @@ class Structure:
         return low, high
 
     def is_fixed(self, expression: Any) -> bool:
-        return all(map(self._is_known, references(expression)))
+        return all(map(self.is_known, references(expression)))
 
-    def _is_known(self, reference: tree.ComponentReference) -> bool:
+    def is_known(self, reference: tree.ComponentReference) -> bool:
         """Whether a reference leads to a parameter or constant."""
         if not self.has(reference.parts[0][0]):
             return reference.parts[0][0] != "time"
@@ -228,9 +203,8 @@ class ClassMember:
             found = said.member_clause
             if found is not None and said.redeclared is not None:
                 if not {"replaceable", "redeclare"} & set(self.element.clause.prefixes):
-                    said.redeclared.scope.refuse(
-                        said.at, f"found '{self.name}' redeclared, expected what is declared 'replaceable'"
-                    )
+                    words = f"found '{self.name}' redeclared, expected what is declared 'replaceable'"
+                    said.redeclared.scope.refuse(said.at, words)
                 return found, said.redeclared.scope
         return self.element.clause, self.element.scope
 
@@ -255,6 +229,19 @@ class ClassMember:
             for _, modifier in one.bases:  # attributes of a type are those of each element
                 each = {name: replace(said_of, each=True) for name, said_of in modifier.inner.items()}
                 said = merged(said, replace(modifier, inner=each))
+        return said if self.over.value is not None or said.value is not None else self._begun(said)
+
+    def _begun(self, said: Modifier) -> Modifier:
+        """The same with the value that an initial equation gives to a parameter with `fixed = false`."""
+        fixed = said.inner.get("fixed", self.over.inner.get("fixed"))
+        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
+        for section in self.owner.scope.sections if free and "parameter" in self.prefixes else ():
+            for item in section.items if section.kind == "initial equation" else ():
+                if isinstance(item, tree.SimpleEquation) and isinstance(item.left, tree.ComponentReference):
+                    named = item.left.parts == ((self.name, ()),)
+                    if named and self.owner.is_fixed(item.right):
+                        self.owner.started.append(item)
+                        return replace(said, value=item.right, scope=section.scope, at=item.at)
         return said
 
     @cached_property
@@ -305,7 +292,7 @@ class ClassMember:
 
     @property
     def is_parameter(self) -> bool:
-        stated = bool({"parameter", "constant"} & self.prefixes) and not self.is_solved
+        stated = bool({"parameter", "constant"} & self.prefixes) and not (self.is_solved or self.follows)
         return stated or self.kind == "String"
 
     @cached_property
@@ -314,6 +301,17 @@ class ClassMember:
         fixed = self.full.inner.get("fixed")
         free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
         return free and "parameter" in self.prefixes and self.full.value is None
+
+    @cached_property
+    def follows(self) -> bool:
+        """Whether its value is computed from that of such a parameter."""
+        vars(self)["follows"] = (
+            False  # while it is asked for: a circle is told where its values are asked for
+        )
+        said = self.full
+        found = references(said.value) if isinstance(said.value, tree.TreeNode) else []
+        leaves = [(said.node or self.owner).leaf(one) for one in found]
+        return any(one is not None and (one.is_solved or one.follows) for one in leaves)
 
     @property
     def is_folded(self) -> bool:
@@ -352,6 +350,9 @@ class ClassMember:
             if self.full.value is None:
                 words = f"found ':' as a size of '{self.name}' without a value, expected a value or a size"
                 scope.refuse(size.at, words)
+            listed = self.full.value if not (dimension or self.full.path) else None
+            if isinstance(listed, tree.ArrayConstructor) and not listed.iterators:
+                return len(listed.items)
             before = set(self.owner.read)
             found = np.shape(self.owner.folded(self.full))
             self.owner.read.intersection_update(before)

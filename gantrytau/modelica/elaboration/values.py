@@ -353,7 +353,6 @@ REFUSED: Mapping[str, str] = {
     "actualStream": "write a connector with flow and potential variables",
     "spatialDistribution": "write a chain of volumes",
     "terminal": "leave out what is done at the end",
-    "getInstanceName": "write the text itself",
 }
 
 

@@ -172,4 +172,18 @@ def begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
     names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
     scalars = (scalar for one in firsts for scalar in one.elements())
     own = tuple(one for one in scalars if one.dep(0).name() in names)
-    return WhenChain((at_start(own), *stated.branches)) if own else stated
+    sampled = next((one for one in stated.branches if one.words == "sample"), None)
+    first = tuple(_first_actions(own, sampled)) if own and sampled is not None else own
+    return WhenChain((at_start(first), *stated.branches)) if own else stated
+
+
+def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
+    """What is set at the start, and what a sample makes of it where its first instant is the start."""
+    given = {one.dep(0).name(): one for one in own}
+    instants = [one for one in ca.symvar(sampled.condition) if "next_sample_" in one.name()]
+    first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
+    for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
+        left = scalar.dep(0)
+        before = given.pop(left.name()).dep(1) if left.name() in given else pre(left)
+        yield left == if_else(first, scalar.dep(1), before)
+    yield from given.values()

@@ -1,12 +1,13 @@
-"""External functions by their names in C: tables, texts, files."""
+"""External functions by their names in C: tables, random numbers, texts, files."""
 
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.modelica.external import tables
+from gantrytau.modelica.external import random_numbers, tables
 from gantrytau.modelica.source import SourceText
 
 PATH = "ModelicaInternal_fullPathName"
@@ -57,8 +58,26 @@ def _behind_blanks(text: str, start: int = 1) -> int:
     return start + len(rest) - len(rest.lstrip())
 
 
+def _signed(number: int) -> int:
+    """Its lowest 32 bits, of which the highest one is the sign."""
+    return (number + 2**31) % 2**32 - 2**31
+
+
+def _hashed(text: str) -> int:
+    """The hash of Arash Partow, from which noise takes its seeds by the name of an instance."""
+    found = 0xAAAAAAAA
+    for k, byte in enumerate(text.encode()):
+        mixed = (found << 7) ^ byte * (found >> 3) if k % 2 == 0 else ~((found << 11) + (byte ^ (found >> 5)))
+        found = (found ^ mixed) & 0xFFFFFFFF
+    return _signed(found)
+
+
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     **tables.FUNCTIONS,
+    **random_numbers.FUNCTIONS,
+    "ModelicaRandom_automaticGlobalSeed": lambda _: _signed(time.time_ns()),
+    "ModelicaRandom_setInternalState_xorshift1024star": lambda *_: (),  # of impure generators, which are refused
+    "ModelicaStrings_hashString": _hashed,
     "ModelicaStrings_length": len,
     "ModelicaStrings_substring": lambda text, first, last: text[first - 1 : last],
     "ModelicaStrings_compare": _compared,
