@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Self
 
@@ -34,14 +34,15 @@ class BoardLine:
     def __init__(
         self, port: str | int, code: StepCode, *, baud: int = 115200, wait: float = 1.0, retries: int = 2
     ):
-        self._code = instance("BoardLine", "code", code, StepCode)
         self._wait = number("BoardLine", "wait", wait, unit="s", above=0.0)
         self._retries = whole("BoardLine", "retries", retries, least=0)
+        whole("BoardLine", "baud", baud, least=1)
+        self._code = instance("BoardLine", "code", code, StepCode)
         self._name = str(port)
         self._type = np.dtype("<f8" if code.real == "double" else "<f4")
         self.wrong_crc = self.skipped = self.repeated = 0
         self._sequence, self._bytes = 0, b""
-        self._file = _opened(port, whole("BoardLine", "baud", baud, least=1))
+        self._file = _opened(port, baud)
 
     def __enter__(self) -> Self:
         return self
@@ -116,12 +117,20 @@ def framed(sequence: int, payload: bytes) -> bytes:
     return bytes([SYNC]) + inside + binascii.crc_hqx(inside, 0xFFFF).to_bytes(2, "little")
 
 
-@contextmanager
-def emulated_board(code: StepCode, *, wait: float = 1.0, retries: int = 2) -> Iterator[BoardLine]:
+def emulated_board(
+    code: StepCode, *, wait: float = 1.0, retries: int = 2
+) -> AbstractContextManager[BoardLine]:
     """The board's program, compiled by the C compiler of this computer, behind a pseudo-terminal (Linux, macOS).
 
     Raises ModelError if there is no compiler, or if it fails.
     """
+    number("emulated_board", "wait", wait, unit="s", above=0.0)
+    whole("emulated_board", "retries", retries, least=0)
+    return _emulated(instance("emulated_board", "code", code, StepCode), wait, retries)
+
+
+@contextmanager
+def _emulated(code: StepCode, wait: float, retries: int) -> Iterator[BoardLine]:
     command = c_compiler()
     if command is None:
         raise ModelError("emulated_board: found no C compiler, expected cc, gcc or clang; install one")

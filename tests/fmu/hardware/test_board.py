@@ -4,6 +4,7 @@ import os
 import shutil
 import threading
 import tty
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def pid():
     return DiscretePid(k=3.0, T_i=0.2, T_d=0.02, limits=(-1.5, 1.5), period=PERIOD)
 
 
-def code(real="double"):
+def code(real: Literal["double", "float"] = "double"):
     return step_code(pid(), given=["u_s", "u_m"], find=["y"], real=real)
 
 
