@@ -17,6 +17,7 @@ from typing import Any
 from unittest.mock import patch
 
 from gantrytau import translate
+from gantrytau.whole_files import replacing
 from notebooks.site.builder.executed_notebooks import state
 from notebooks.site.builder.gallery.examples import Example, examples
 from notebooks.site.builder.places import DRAWN
@@ -55,11 +56,8 @@ def drawn_examples(workers: int | None = None) -> dict[str, Drawn]:
     missing = [name for name, file in files.items() if not file.exists()]
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers or len(os.sched_getaffinity(0)), mp_context=context) as pool:
-        waiting = {name: pool.submit(run, examples()[name]) for name in missing}
-        for name, done in waiting.items():
-            picture, scene, equations = done.result()
-            files[name].with_suffix(".png").write_bytes(picture)
-            files[name].write_text(json.dumps({"scene": scene, "equations": equations}))
+        for done in [pool.submit(_draw, examples()[name], files[name]) for name in missing]:
+            done.result()
     kept = {file.stem for file in files.values()}
     for stale in (file for file in DRAWN.iterdir() if file.stem not in kept):
         stale.unlink()
@@ -67,6 +65,13 @@ def drawn_examples(workers: int | None = None) -> dict[str, Drawn]:
     return {
         name: Drawn(examples()[name], file.with_suffix(".png"), **told[name]) for name, file in files.items()
     }
+
+
+def _draw(example: Example, file: Path) -> None:
+    picture, scene, equations = run(example)
+    file.with_suffix(".png").write_bytes(picture)
+    with replacing(file) as partial:  # it stands only where the picture does
+        partial.write_text(json.dumps({"scene": scene, "equations": equations}))
 
 
 def run(example: Example) -> tuple[bytes, bool, str]:
