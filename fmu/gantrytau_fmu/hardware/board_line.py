@@ -27,7 +27,7 @@ class BoardLine:
     """A board that runs the C of `step_code`, at a serial port or a file descriptor; a context manager.
 
     wait: s until a frame is sent again, at most `retries` times. wrong_crc, skipped, repeated: frames with a wrong CRC,
-    bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once.
+    bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once. Begin with `reset()`: the board may know frames of another host.
     Raises ModelError for a port that cannot be opened, SolveError where no answer comes.
     """
 
@@ -40,6 +40,12 @@ class BoardLine:
         self._code = instance("BoardLine", "code", code, StepCode)
         self._name = str(port)
         self._type = np.dtype("<f8" if code.real == "double" else "<f4")
+        most = 255 // self._type.itemsize
+        if max(len(code.given), len(code.find)) > most:
+            counts = f"{len(code.given)} given and {len(code.find)} found"
+            raise ModelError(
+                f"BoardLine: found {counts} numbers, expected at most {most} in a frame; name fewer"
+            )
         self.wrong_crc = self.skipped = self.repeated = 0
         self._sequence, self._bytes = 0, b""
         self._file = _opened(port, baud)
