@@ -27,7 +27,8 @@ class BoardLine:
     """A board that runs the C of `step_code`, at a serial port or a file descriptor; a context manager.
 
     wait: s until a frame is sent again, at most `retries` times. wrong_crc, skipped, repeated: frames with a wrong CRC,
-    bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once. Begin with `reset()`: the board may know frames of another host.
+    bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once.
+    Begin with `reset()`: the board may know frames of another host.
     Raises ModelError for a port that cannot be opened, SolveError where no answer comes.
     """
 
