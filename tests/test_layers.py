@@ -31,7 +31,7 @@ ORDER = {  # a room imports the rooms before it
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies robot_samples workspace_resolution candidates "
     "pose_choice monte_carlo motion_planning plan_acceptance pose_plan "
     "documents calibration_plan plan_calibration cells measured_plan __init__",
-    "gantrytau_fmu": "description code describing building reading export systems controller __init__",
+    "gantrytau_fmu": "description code describing building reading export systems controller hardware __init__",
 }
 READMES = {  # the page with the map of a folder
     "gantrytau": ROOT / "gantrytau" / "README.md",

@@ -28,6 +28,7 @@ DOORS = (
     "gantrytau_optimica.vision",
     "gantrytau_fmu",
     "gantrytau_fmu.controller",
+    "gantrytau_fmu.hardware",
 )
 NO_NUMBERS = (float("nan"), "many", True, [1.0, "a"])
 NO_WORDS = ("wordless", 7, ["a"])

@@ -52,6 +52,29 @@ def instant_function(dae: Translated, given: Sequence[str], find: Sequence[str])
     return ca.Function("f", x, behind.call(moved), behind.name_in(), behind.name_out())
 
 
+def sample_function(dae: Translated, given: Sequence[str], find: Sequence[str]) -> ca.Function:
+    """One step of a sampled controller: (given, held before) -> (find, held behind), vectors of scalars.
+
+    held: the sampled variables in the order of `dae.flat.sampled`; `find` is evaluated behind the instant. Raises
+    ModelError for a model with states, whens, delays or friction, or without sampled variables.
+    """
+    flat = dae.flat
+    if dae.states or flat.whens or flat.delays or flat.frictions or not flat.sampled:
+        what = "states" if dae.states else "whens, delays or friction" if flat.sampled else "nothing sampled"
+        raise ModelError(
+            f"{dae.name}: found {what}, expected a model of sampled variables alone; leave the plant out"
+        )
+    held = [s.name for s in flat.sampled]
+    renewed = retranslate(dae, _with_unknowns(flat, {s.name: s.expression for s in flat.sampled}))
+    before = function(renewed, [*given, *held], [f"after({n})" for n in held])
+    behind = function(dae, [*given, *held], find)
+    u = [ca.MX.sym(n, *before.size_in(k)) for k, n in enumerate(given)]
+    x = ca.MX.sym("held", len(held))
+    new = before.call([*u, *ca.vertsplit(x)])
+    found = behind.call([*u, *new])
+    return ca.Function("sample", [*u, x], [ca.vertcat(*found), ca.vertcat(*new)])
+
+
 def _refuse(dae: Translated, given: Sequence[str]) -> None:
     """ModelError for what is set at instants and is given without saying that it is the value before."""
     if not dae.flat.whens:
