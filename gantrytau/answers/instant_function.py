@@ -59,8 +59,12 @@ def sample_function(dae: Translated, given: Sequence[str], find: Sequence[str]) 
     ModelError for a model with states, whens, delays or friction, or without sampled variables.
     """
     flat = dae.flat
-    if dae.states or flat.whens or flat.delays or flat.frictions or not flat.sampled:
-        what = "states" if dae.states else "whens, delays or friction" if flat.sampled else "nothing sampled"
+    if not flat.sampled:
+        raise ModelError(
+            f"{dae.name}: found nothing sampled, expected sampled(y, ..., period=...) of what the controller sets"
+        )
+    if dae.states or flat.whens or flat.delays or flat.frictions:
+        what = "states" if dae.states else "whens, delays or friction"
         raise ModelError(
             f"{dae.name}: found {what}, expected a model of sampled variables alone; leave the plant out"
         )

@@ -28,12 +28,18 @@ class BoardLine:
 
     wait: s until a frame is sent again, at most `retries` times. wrong_crc, skipped, repeated: frames with a wrong CRC,
     bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once.
-    Begin with `reset()`: the board may know frames of another host.
+    The first step resets the board, which may know frames of another host.
     Raises ModelError for a port that cannot be opened, SolveError where no answer comes.
     """
 
     def __init__(
-        self, port: str | int, code: StepCode, *, baud: int = 115200, wait: float = 1.0, retries: int = 2
+        self,
+        port: str | os.PathLike[str] | int,
+        code: StepCode,
+        *,
+        baud: int = 115200,
+        wait: float = 1.0,
+        retries: int = 2,
     ):
         self._wait = number("BoardLine", "wait", wait, unit="s", above=0.0)
         self._retries = whole("BoardLine", "retries", retries, least=0)
@@ -48,7 +54,7 @@ class BoardLine:
                 f"BoardLine: found {counts} numbers, expected at most {most} in a frame; name fewer"
             )
         self.wrong_crc = self.skipped = self.repeated = 0
-        self._sequence, self._bytes = 0, b""
+        self._sequence, self._bytes, self._begun = 0, b"", False
         self._file = _opened(port, baud)
 
     def __enter__(self) -> Self:
@@ -56,14 +62,18 @@ class BoardLine:
 
     def __exit__(self, *_: object) -> None:
         os.close(self._file)
+        self._file = -1  # another file may get the number
 
     def reset(self) -> None:
         """The controller on the board begins anew."""
         self._ask(b"", 0)
+        self._begun = True
 
     def step(self, given: np.ndarray | list[float]) -> np.ndarray:
         """One step of the controller: what it finds, (m,), for what it is given, (n,), both in the order of the code."""
         values = array("BoardLine.step", "given", given, (len(self._code.given),))
+        if not self._begun:
+            self.reset()
         size = self._type.itemsize * len(self._code.find)
         return np.frombuffer(self._ask(values.astype(self._type).tobytes(), size), self._type).astype(float)
 
@@ -72,7 +82,7 @@ class BoardLine:
         sent = framed(self._sequence, payload)
         for attempt in range(self._retries + 1):
             self.repeated += attempt > 0
-            os.write(self._file, sent)
+            self._write(sent)
             until = time.monotonic() + self._wait
             while (left := until - time.monotonic()) > 0:
                 if select.select([self._file], [], [], left)[0]:
@@ -86,14 +96,27 @@ class BoardLine:
             "check the wiring, the baud rate, and that the board runs the C of the same step_code"
         )
 
+    def _write(self, frame: bytes) -> None:
+        try:
+            os.write(self._file, frame)
+        except BlockingIOError:  # the board reads nothing: a frame that does not fit is lost
+            return
+        except OSError as error:
+            raise self._closed() from error
+
     def _read(self) -> bytes:
         try:
             found = os.read(self._file, 4096)
-        except OSError:  # the other end of a pseudo-terminal is closed
-            found = b""
-        if found:
-            return found
-        raise SolveError(
+        except BlockingIOError:
+            return b""
+        except OSError as error:  # the other end of a pseudo-terminal is closed, or the board is unplugged
+            raise self._closed() from error
+        if not found:
+            raise self._closed()
+        return found
+
+    def _closed(self) -> SolveError:
+        return SolveError(
             f"{self._name}: found the line closed, expected an answer to frame {self._sequence}; is the board still there?"
         )
 
@@ -155,8 +178,10 @@ def _emulated(code: StepCode, wait: float, retries: int) -> Iterator[BoardLine]:
                 "the variable CC names another compiler"
             )
         host, board = os.openpty()
+        os.set_blocking(host, False)
         _raw(board, None)
-        process = subprocess.Popen([program], stdin=board, stdout=board)
+        # a session of its own: Ctrl-C at the host does not reach the board
+        process = subprocess.Popen([program], stdin=board, stdout=board, start_new_session=True)
         os.close(board)
         try:
             with BoardLine(host, code, wait=wait, retries=retries) as line:
@@ -166,14 +191,19 @@ def _emulated(code: StepCode, wait: float, retries: int) -> Iterator[BoardLine]:
             process.wait()
 
 
-def _opened(port: str | int, baud: int) -> int:
+def _opened(port: str | os.PathLike[str] | int, baud: int) -> int:
+    instance(
+        "BoardLine", "port", port, (str, os.PathLike, int), "the name of a serial port, or a file descriptor"
+    )
     if isinstance(port, int):
         return port
     try:
-        file = os.open(port, os.O_RDWR | os.O_NOCTTY)
-    except OSError as error:
+        # without waiting for a carrier, nor for a board that reads nothing
+        file = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", error)
         raise ModelError(
-            f"BoardLine: found no port {port} ({error.strerror}), expected a serial port, as /dev/ttyACM0; plug the board "
+            f"BoardLine: found no port {port} ({why}), expected a serial port, as /dev/ttyACM0; plug the board "
             "in, look with `ls /dev/tty*`, and be allowed to use it (Linux: group dialout)"
         ) from error
     try:
@@ -198,6 +228,8 @@ def _raw(file: int, baud: int | None) -> None:
             words = "expected a speed of this system, as 115200"
             raise ModelError(words, place="BoardLine", found=Given("baud", baud))
         settings = termios.tcgetattr(file)
+        settings[2] |= termios.CLOCAL | termios.CREAD  # no modem
+        settings[2] &= ~(termios.CSTOPB | getattr(termios, "CRTSCTS", 0))
         settings[4] = settings[5] = speed
         termios.tcsetattr(file, termios.TCSANOW, settings)
         termios.tcflush(file, termios.TCIOFLUSH)

@@ -87,11 +87,14 @@ def step_code(
     """
     check_words(step_code, {"real": real})
     instance("step_code", "model", model, Model)
+    for argument, names in {"given": given, "find": find}.items():
+        if not names:
+            raise ModelError("expected at least one name", place="step_code", found=Given(argument, names))
     dae = translate(model, given=given, find=find, events=True)
     step = sample_function(dae, given, find)
     periods = {dae.number(s.period) for s in dae.flat.sampled}
     if len(periods) != 1:
-        words = "expected one; write a C code for each"
+        words = "expected one; make a model for each, or count the samples of the fast one in the slow one"
         raise ModelError(words, place=dae.name, found=Given("periods", sorted(periods)))
     u = ca.SX.sym("u", sum(len(dae.expand(n)) for n in given))
     x = ca.SX.sym("x", len(dae.flat.sampled))
