@@ -1,7 +1,8 @@
-"""References in expressions."""
+"""References in expressions, and what they may mean."""
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
 
 from gantrytau.modelica import tree
 
@@ -20,6 +21,66 @@ def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
             yield from nodes_of(getattr(expression, name))
 
 
+def dotted(e: Any) -> str:
+    """The name of a reference without subscripts, with dots; "" for another expression."""
+    named = isinstance(e, tree.ComponentReference) and not any(subscripts for _, subscripts in e.parts)
+    return ".".join(name for name, _ in e.parts) if named else ""
+
+
 def references(expression: Any) -> list[tree.ComponentReference]:
     """The references in an expression, but for names of functions."""
     return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
+
+
+def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
+    """The connections among equations, with the loops and conditions around them."""
+    found = []
+    for one in items:
+        if isinstance(one, tree.ForLoop):
+            found.append(replace(one, items=connects_in(one.items)))
+        elif isinstance(one, tree.Branching) and one.word == "if":
+            branches = tuple((test, connects_in(inner)) for test, inner in one.branches)
+            kept = replace(one, branches=branches, otherwise=connects_in(one.otherwise or ()))
+            found += [kept] if any(isinstance(n, tree.ConnectEquation) for n in nodes_of(kept)) else []
+        elif isinstance(one, tree.ConnectEquation):
+            found.append(one)
+    return tuple(found)
+
+
+class Members(Protocol):
+    """An instance of a class: a component, a package with its constants, or what a function computes with."""
+
+    @property
+    def instance_name(self) -> str:
+        """Its path behind the name of the whole model."""
+        ...
+
+    def has(self, name: str) -> bool:
+        """Whether its class has a component of that name."""
+
+    def member(self, name: str) -> Any:
+        """The value of a component."""
+
+    def names(self) -> Sequence[str]:
+        """Names of its components."""
+
+    def shape(self, name: str) -> tuple[int, ...] | None:
+        """The sizes of a component; None where only its value has them."""
+
+    def next_sample(self, call: tree.Call) -> Any:
+        """The next instant of a `sample`; of `initial()` whether it is the start, 1 or 0."""
+
+    def before(self, name: str, asked: str) -> Any:
+        """The Discrete that follows a variable of that dotted name, as `pre`, `edge` or `change` asks; None without one."""
+
+    def turn(self, name: str) -> Any:
+        """The parity of the changes of a variable that a Discrete follows; None for another one."""
+
+    def type_of(self, reference: tree.ComponentReference) -> str:
+        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
+
+    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+        """The least and the greatest value of an Integer; None for a Boolean."""
+
+    def is_fixed(self, expression: tree.Expression) -> bool:
+        """Whether it holds parameters and constants only."""

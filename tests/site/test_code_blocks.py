@@ -11,6 +11,7 @@ SITE = Path(__file__).parents[2] / "notebooks" / "site"
 MADE = {
     "reference",
     "messages",
+    "gallery",
 }  # folders that are written when the site is built, which finds broken links itself
 PAGES = [page for page in sorted(SITE.rglob("*.md")) if blocks(page.read_text(encoding="utf-8"))]
 

@@ -10,13 +10,16 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.statements import Items, looped
+from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
+from gantrytau.modelica.references import Members
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -81,6 +84,7 @@ class Execution:
                         target.at,
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
+                self._refuse_given(target, reader)
                 wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
@@ -94,6 +98,26 @@ class Execution:
                     self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
+
+    def acting(self, items: Items, reader: Interpreter) -> Iterator[Any]:
+        """The actions of a branch of `when` in an algorithm of a model."""
+        run = Execution(replace(reader, local=self.reader.local), dict(self.known), self.shapes)
+        for item in items:
+            if isinstance(item, tree.ProcedureCall):
+                yield action_of(item.call, replace(reader, local={**self.reader.local, **run.known}))
+            else:
+                run.run([item])
+        for name in dict.fromkeys(targets(items)):
+            yield ca.SX(values.to_casadi(reader.members.member(name))) == values.to_casadi(run.known[name])
+
+    def _refuse_given(self, target: tree.ComponentReference, reader: Interpreter) -> None:
+        """TextError where what is assigned is known from outside."""
+        name = target.parts[0][0]
+        prefixes = reader.scope.elements[name].clause.prefixes if name in reader.scope.elements else ()
+        given = next((word for word in ("input", "parameter", "constant") if word in prefixes), "")
+        if given == "input" or (given and reader.members.is_fixed(target)):
+            words = f"found the {given} '{name}' assigned, expected a variable; assign to one of another name"
+            reader.scope.refuse(target.at, words)
 
     def _check_shape(self, name: str, value: Any) -> None:
         shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
@@ -214,31 +238,33 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
 def stated_by_algorithm(
     items: Items, reader: Interpreter, wanted: Collection[str] | None = None
 ) -> Iterator[Any]:
-    """The equations that an algorithm of a model amounts to: one for each variable that it assigns, or each wanted one."""
-    names = dict.fromkeys(assigned(items))
-    run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
-    run.run(items)
-    for name, value in run.known.items():
+    """What an algorithm of a model amounts to: whens, and an equation for each variable assigned, or for each wanted."""
+    whens = [one for one in items if isinstance(one, tree.Branching) and one.word == "when"]
+    held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
+    names = [n for n in dict.fromkeys(targets(items)) if n not in held]
+    run = Execution(reader, dict.fromkeys(names))
+    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.shape(n))}
+    run.known |= {n: reader.members.member(n) for n in held}
+    old = {n: values.called("pre", [one], {}) for n, one in run.known.items() if n in held}
+    for item in items:
+        if item in whens:
+            before = replace(run, known={**run.known, **old})
+            yield from when_chains(
+                item, replace(reader, local={**reader.local, **before.known}), before.acting
+            )
+            for name in (n for _, inner in item.branches for n in targets(inner)):
+                old.pop(name, None)  # what follows has its new value
+        else:
+            run.run([item])
+    for name in names:
         if wanted is not None and name not in wanted:
             continue
-        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
+        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(run.known[name])
         if right is None:
             raise ModelError(
                 f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
         yield ca.SX(left) == right
-
-
-def assigned(items: Items) -> Iterator[str]:
-    """Names of the variables that statements set."""
-    for item in items:
-        if isinstance(item, tree.Assignment):
-            yield from (target.parts[0][0] for target in item.targets if target is not None)
-        elif isinstance(item, (tree.ForLoop, tree.WhileLoop)):
-            yield from assigned(item.items)
-        elif isinstance(item, tree.Branching):
-            for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from assigned(inner)
 
 
 def called_class(

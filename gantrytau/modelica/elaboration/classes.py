@@ -1,37 +1,50 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import reduce
 from pathlib import Path
-from typing import Any, ClassVar, Self
-
-import casadi as ca
+from typing import Any, ClassVar, Self, cast
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
-from gantrytau.language.events import Happening, WhenChain
-from gantrytau.language.functions import if_else
+from gantrytau.language.events import WhenChain
 from gantrytau.language.model import Connector, Declared, Model, Outer
-from gantrytau.language.symbols import der, pre
+from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
+from gantrytau.modelica.conditions import (
+    AT_START,
+    BEHIND,
+    TURN,
+    calls_before,
+    chain_of,
+    changed_in,
+    checks_in,
+    first_valued,
+    followed_name,
+    gives_value_before,
+    guarded_samples,
+    instants,
+    is_call,
+    sample_calls,
+    sample_name,
+    targets,
+)
+from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
-from gantrytau.modelica.elaboration.placed import AT_START, SAMPLE, Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
-    BEFORE,
     AbsentComponent,
-    at_start,
-    first_valued,
-    gives_value_before,
-    instants,
     remembers,
-    sample_calls,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
-from gantrytau.modelica.references import nodes_of
+from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
+from gantrytau.modelica.references import dotted, nodes_of
+
+TAKEN = "a name that is taken, expected another name"
 
 
 class TextClass(Declared):
@@ -77,6 +90,9 @@ class ModelicaModel(TextClass, Model):
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
             yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+        for name in _followed(self.structure):
+            old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
+            yield follows(reduce(getattr, name.split("."), self), old, turn)
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
                 yield der(getattr(self, name)) == 0
@@ -128,7 +144,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         if name in kind._taken or name.startswith("_"):
             scope.refuse(
                 one.element.declaration.at,
-                f"found a component '{name}', a name that is taken, expected another name",
+                f"found a component '{name}', {TAKEN}",
             )
         if not one.present or one.is_object:
             body[name] = None
@@ -143,6 +159,18 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
         start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
         body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
+    body["_followed"] = (*_followed(structure), *map(sample_name, guarded_samples(_whens(structure))))
+    for name in body["_followed"]:
+        body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
+    for name in _followed(structure):
+        body[followed_name(BEHIND, name)] = Discrete(0, description=f"{name} before an instant")
+    taken = next((n for n in structure.members if isinstance(body.get(n), Discrete) and n not in held), None)
+    if taken is not None:
+        scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
+    for call in (
+        call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
+    ):
+        body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
@@ -186,9 +214,16 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
-            if name in held and isinstance(item, tree.SimpleEquation) and structure.is_fixed(item.right):
+            if not isinstance(item, tree.SimpleEquation):
+                continue
+            names = chain_of(name, structure.scope.sections) if dotted(item.left) else [name]
+            if is_call(item.right, "pre"):
+                if chain_of(dotted(cast(Any, item.right).arguments[0]), structure.scope.sections)[-1] == name:
+                    structure.started.append(item)  # holds by the equations between the two
+            elif names[-1] in held and structure.is_fixed(item.right):
                 structure.started.append(item)
-                yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
+                for one in filter(held.__contains__, names):
+                    yield one, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
 def _held(structure: Structure) -> Iterator[str]:
@@ -203,15 +238,7 @@ def _held(structure: Structure) -> Iterator[str]:
                 yield left.parts[0][0]
     for item in _whens(structure):
         for _, items in item.branches:
-            left = list(items)
-            for one in left:
-                if isinstance(one, tree.ForLoop):
-                    left += one.items
-                targets = (one.left,) if isinstance(one, tree.SimpleEquation) else ()
-                for target in targets:
-                    for each in target.items if isinstance(target, tree.OutputList) else (target,):
-                        if isinstance(each, tree.ComponentReference):
-                            yield each.parts[0][0]
+            yield from targets(items)
 
 
 def _asked_before(structure: Structure) -> set[str]:
@@ -219,12 +246,31 @@ def _asked_before(structure: Structure) -> set[str]:
     tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
     calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
-    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in BEFORE]
+    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
     known = (structure.members.get(name) for name in names)
     return {
         one.name for one in known if one and one.kind == "Boolean" and not one.is_parameter and not one.shape
     }
+
+
+def _followed(structure: Structure) -> list[str]:
+    """Variables that Discretes follow, as values before an instant are asked for beside those behind it."""
+    branches = [branch for item in _whens(structure) for branch in item.branches]
+    changes = {name for test, items in branches for name in changed_in(test, items)}
+    alone = {id(one) for test, _ in branches for one in instants(test)}
+    said = [one.element.declaration.modification for one in structure.members.values()]
+    found: list[str] = []
+    for call in calls_before([said, [section.items for section in structure.scope.sections]]):
+        asked, name = call.function.parts[0][0], dotted(call.arguments[0])
+        one = structure.leaf(cast(tree.ComponentReference, call.arguments[0]))
+        if one is None or one.is_parameter or one.shape or (asked == "edge" and id(call) in alone):
+            continue
+        number = one.kind == "Integer" or one.literals is not None
+        beside = asked != "pre" or name in changes or (number and name not in _held(structure))
+        if beside and (number or one.kind == "Boolean"):
+            found.append(name)
+    return [*dict.fromkeys(found)]
 
 
 def _all_sections(structure: Structure) -> Iterator[StatementSection]:
@@ -317,58 +363,21 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
             items = (
                 [i for i in items if first_valued(i) not in held and not gives_value_before(i)]
                 if initial
-                else _set_by_whens(items, held)
+                else set_by_whens(items, held)
             )
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
-        reader = replace(
-            reader, settled=starts and not initial
-        )  # a value before the start is what is set there
+        reader = replace(reader, settled=starts and not initial)  # pre(x) is what is set at the start
         try:
             if starts and (steps or not initial):
-                named = set(assigned(items)) - held if initial else held.intersection(assigned(items))
+                named = set(targets(items)) - held if initial else held.intersection(targets(items))
                 found = stated_by_algorithm(items, reader, named) if named else ()
             else:
                 found = (stated_by_algorithm if steps else stated)(items, reader)
             if starts and not initial:
                 firsts += found
             else:
-                yield from (_begun(one, firsts) for one in found)
+                yield from (begun(one, firsts) for one in found)
         except AbsentComponent as error:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None
-
-
-def _set_by_whens(items: Iterable[Any], held: Collection[str]) -> list[tree.Assignment]:
-    """The initial equations of what a `when` sets, as assignments."""
-    found = (
-        (one, tree.ComponentReference(one.at, ((name, ()),)))
-        for one in items
-        if (name := first_valued(one)) in held
-    )
-    return [tree.Assignment(one.at, None, None, False, (left,), one.right) for one, left in found]
-
-
-def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
-    """A statement; a chain of `when` also gives what it sets the values of initial sections."""
-    if not isinstance(stated, WhenChain) or not firsts:
-        return stated
-    actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]
-    names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
-    scalars = (scalar for one in firsts for scalar in one.elements())
-    own = tuple(one for one in scalars if one.dep(0).name() in names)
-    sampled = next((one for one in stated.branches if one.words == "sample"), None)
-    first = tuple(_first_actions(own, sampled)) if own and sampled is not None else own
-    return WhenChain((at_start(first), *stated.branches)) if own else stated
-
-
-def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
-    """What is set at the start, and what a sample makes of it where its first instant is the start."""
-    given = {one.dep(0).name(): one for one in own}
-    instants = [one for one in ca.symvar(sampled.condition) if SAMPLE in one.name()]
-    first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
-    for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
-        left = scalar.dep(0)
-        before = given.pop(left.name()).dep(1) if left.name() in given else pre(left)
-        yield left == if_else(first, scalar.dep(1), before)
-    yield from given.values()

@@ -50,9 +50,9 @@ class Structure:
                 one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
-                place = self.scope.name
-                words = f"found '{name}' modified, which is protected in {place}, expected a public component; extend"
-                one.scope.refuse(one.at, f"{words} {place} to modify it")
+                where = self.scope.name
+                words = f"found '{name}' modified, which is protected in {where}, expected a public component"
+                one.scope.refuse(one.at, f"{words}; extend {where} to modify it")
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
     def has(self, name: str) -> bool:
@@ -75,6 +75,12 @@ class Structure:
 
     def next_sample(self, call: tree.Call) -> Any:
         raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
+
+    def before(self, name: str, asked: str) -> Any:
+        return None
+
+    def turn(self, name: str) -> Any:
+        return None
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
@@ -299,9 +305,7 @@ class ClassMember:
     @cached_property
     def follows(self) -> bool:
         """Whether its value is computed from that of such a parameter."""
-        vars(self)["follows"] = (
-            False  # while it is asked for: a circle is told where its values are asked for
-        )
+        vars(self)["follows"] = False  # while it is asked for: circles are told with their values
         said = self.full
         found = references(said.value) if isinstance(said.value, tree.TreeNode) else []
         leaves = [(said.node or self.owner).leaf(one) for one in found]
@@ -374,17 +378,14 @@ class ClassMember:
             words = f"found a component of {kind.name}, which is partial, expected a class that extends it"
             scope.refuse(clause.at, words)
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        said = (
-            [self.full.of_element(k, self.shape[0]) for k in range(self.shape[0])]
-            if self.shape
-            else [self.full]
-        )
+        each = [self.full.of_element(k, count) for count in self.shape for k in range(count)]
+        said = each if self.shape else [self.full]
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
-        around = self.owner
-        while around is not None:
-            if around.scope.definition is kind.definition:
-                scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
+        around: Structure | None = self.owner
+        while around is not None and around.scope.definition is not kind.definition:
             around = around.around
+        if around is not None:
+            scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
 
     def _inner(self) -> "ClassMember | None":

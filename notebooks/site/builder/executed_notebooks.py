@@ -21,7 +21,7 @@ def executed_notebooks(workers: int | None = None) -> dict[Path, Path]:
     """Sources of notebooks, and files of the same with outputs; RuntimeError with the cell that fails."""
     paths = sorted(NOTEBOOKS.glob("*.py"))
     EXECUTED.mkdir(parents=True, exist_ok=True)
-    found = {path: EXECUTED / f"{path.stem}-{_state(path)}.ipynb" for path in paths}
+    found = {path: EXECUTED / f"{path.stem}-{state(path.read_bytes())}.ipynb" for path in paths}
     missing = sorted((p for p, file in found.items() if not file.exists()), key=_duration, reverse=True)
     with ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
         for done in [pool.submit(_execute, path, found[path]) for path in missing]:
@@ -63,12 +63,13 @@ def _duration(path: Path) -> int:
     return path.stat().st_size
 
 
-def _state(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes() + _state_of_packages()).hexdigest()[:16]
+def state(source: bytes) -> str:
+    """A digest of a source and of all that it could call."""
+    return hashlib.sha256(source + state_of_packages()).hexdigest()[:16]
 
 
 @cache
-def _state_of_packages() -> bytes:
+def state_of_packages() -> bytes:
     """A digest of all files of the packages."""
     digest = hashlib.sha256(sys.version.encode())
     for folder in PACKAGES.values():

@@ -9,6 +9,7 @@ NOTEBOOKS = ROOT / "notebooks"
 BUILD = ROOT / "build" / "docs"
 STAGE = BUILD / "pages"  # all that Sphinx reads
 EXECUTED = BUILD / "executed"  # notebooks with their outputs
+DRAWN = BUILD / "drawn"  # pictures and equations of examples
 SITE = ROOT / "build" / "site"
 PACKAGES = {
     "gantrytau": ROOT / "gantrytau",

@@ -35,8 +35,10 @@ GENERATED = (
     "reference",
     "messages",
     "thesis",
+    "library",
     "command_line",
     "sources",
+    "gallery",
 )  # folders of pages that nobody writes
 LINK = re.compile(  # or code, in which nothing is one
     r"^```.*?^```|(!?\[(?:`[^`\n]*`|[^\]`])*\]\()([^)\s]+)(\))|`[^`\n]+`", re.MULTILINE | re.DOTALL

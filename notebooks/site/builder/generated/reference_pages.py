@@ -2,11 +2,12 @@
 
 import dataclasses
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property
 from typing import Any
 
 from gantrytau import Connector, Declared, Model
+from notebooks.site.builder.gallery.drawn_examples import Drawn, shown_example
 from notebooks.site.builder.generated.component_tables import component_tables, table
 from notebooks.site.builder.reading.docstrings import escaped, markdown, summary
 from notebooks.site.builder.reading.public_names import PublicName, kind_of, public_names, public_packages
@@ -16,14 +17,14 @@ from notebooks.site.builder.reading.task_groups import TaskGroup, task_groups
 OWN = ("gantrytau", "notebooks")  # packages whose methods are told
 
 
-def reference_pages() -> Iterator[tuple[str, str]]:
-    """Paths below the root of the site and texts of all pages of the reference."""
+def reference_pages(drawn: Mapping[str, Drawn] | None = None) -> Iterator[tuple[str, str]]:
+    """Paths below the root of the site and texts of all pages of the reference; drawn: examples by full names."""
     groups = task_groups()
     yield "reference/index.md", _index(groups)
     yield "reference/names.md", _all_names()
     for group in groups:
         if group.names:
-            yield f"reference/{group.file}.md", group_page(group)
+            yield f"reference/{group.file}.md", group_page(group, drawn or {})
 
 
 def _index(groups: tuple[TaskGroup, ...]) -> str:
@@ -63,8 +64,8 @@ def _sentence(one: PublicName) -> str:
     return "a constant" if kind_of(one.value) == "data" else summary(inspect.getdoc(one.value))
 
 
-def group_page(group: TaskGroup) -> str:
-    """The page of a task."""
+def group_page(group: TaskGroup, drawn: Mapping[str, Drawn]) -> str:
+    """The page of a task; drawn: examples by full names."""
     parts = [f"# {group.title}"]
     if group.synonyms:  # the search finds the page by them
         parts.insert(0, f"---\nmyst:\n  html_meta:\n    keywords: {', '.join(group.synonyms)}\n---")
@@ -73,17 +74,17 @@ def group_page(group: TaskGroup) -> str:
     rows = [(reference(one), _sentence(one)) for one in group.names]
     parts.append(table("", ("name", "what"), rows))
     for one in group.names:
-        parts.append(entry(one))
+        parts.append(entry(one, drawn.get(one.full)))
     return "\n\n".join(parts) + "\n"
 
 
-def entry(one: PublicName) -> str:
-    """The description of a public name as a directive of Sphinx, its members within."""
+def entry(one: PublicName, example: Drawn | None) -> str:
+    """The description of a public name as a directive of Sphinx, its members and its example within."""
     value, kind = one.value, kind_of(one.value)
     link = resolver(one.package)
     body = [f"```python\nfrom {one.package} import {one.name}\n```"]
     if kind in ("class", "exception"):
-        body += list(_class_body(value, link))
+        body += list(_class_body(value, link, shown_example(example, "../gallery") if example else ""))
         known = (
             ""
             if issubclass(value, Declared) and value not in (Declared, Model, Connector)
@@ -111,7 +112,7 @@ def directive(name: str, head: str, body: list[str], colons: int, options: str =
     return f"{fence}{{{name}}} {' '.join(head.split())}\n{options}\n{inner}\n{fence}"
 
 
-def _class_body(cls: type, link: Callable[[str], str | None]) -> Iterator[str]:
+def _class_body(cls: type, link: Callable[[str], str | None], example: str) -> Iterator[str]:
     bases = [base for base in cls.__bases__ if base.__module__.startswith(OWN) and link(base.__name__)]
     if bases:
         yield f"A {', '.join(f'{{py:obj}}`{base.__name__} <{link(base.__name__)}>`' for base in bases)}."
@@ -119,6 +120,7 @@ def _class_body(cls: type, link: Callable[[str], str | None]) -> Iterator[str]:
     generated = dataclasses.is_dataclass(cls) and doc.startswith(f"{cls.__name__}(")
     if doc and not generated:
         yield markdown(doc, arguments(cls), link)
+    yield example
     if issubclass(cls, Declared) and cls not in (Declared, Model, Connector):
         yield from component_tables(cls, link)
         return

@@ -56,6 +56,7 @@ def group_of(module: str) -> TaskGroup | None:
     return max(found, key=lambda pair: pair[0])[1] if found else None
 
 
+@cache
 def task_groups() -> tuple[TaskGroup, ...]:
     """The tasks with their public names in the order of the homes, and of the lines in these."""
     found = []
@@ -64,6 +65,12 @@ def task_groups() -> tuple[TaskGroup, ...]:
         names.sort(key=lambda one: (_place(group, one.home), one.home, one.line))
         found.append(replace(group, names=tuple(names)))
     return tuple(found)
+
+
+@cache
+def page_of(full: str) -> str:
+    """The file of the page that a public name stands on, by its full name."""
+    return next(group.file for group in task_groups() for one in group.names if one.full == full)
 
 
 def _place(group: TaskGroup, module: str) -> int:

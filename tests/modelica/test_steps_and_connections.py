@@ -1,0 +1,105 @@
+"""`cardinality` on both sides of a component; steps as graphs of states have them: conditions and values at the start."""
+
+from gantrytau import load_modelica, simulate
+
+TEXT = """package Lines
+  connector Pin
+    Real v;
+    flow Real i;
+  end Pin;
+  model Grounding
+    Pin p[2], q;
+    Real count[3] = {cardinality(p[1]), cardinality(p[2]), cardinality(q)};
+    Inner inside;
+  equation
+    for k in 1:2 loop
+      if cardinality(p[k]) == 0 then
+        p[k].v = 7;
+      else
+        p[k].i = p[k].v - 1;
+      end if;
+    end for;
+    connect(inside.r, q);
+  end Grounding;
+  model Inner
+    Pin r;
+  equation
+    r.i = r.v;
+  end Inner;
+  model Whole
+    Grounding g;
+    Inner a[3];
+  equation
+    for k in 1:2 loop
+      connect(g.p[1], a[k].r);
+    end for;
+    if size(a, 1) > 2 then
+      connect(a[3].r, g.q);
+    end if;
+  end Whole;
+  model Steps
+    Integer n;
+    Real x(start = 0, fixed = true), counted(start = 0, fixed = true);
+  equation
+    der(x) = 1;
+    der(counted) = 0;
+    n = if x < 1 then 0 else if x < 2 then 1 else 2;
+    when n == 1 then
+      reinit(counted, pre(counted) + 10);
+    elsewhen n <> 0 then
+      reinit(counted, pre(counted) + 1);
+    end when;
+  end Steps;
+end Lines;
+"""
+
+
+def test_connections_are_counted_in_loops_and_conditions_outside_and_inside(tmp_path):
+    (tmp_path / "lines.mo").write_text(TEXT)
+    result = simulate(load_modelica(tmp_path / "lines.mo")["Lines.Whole"](), stop=1.0)
+    assert [result.final(f"g.count[{k}]") for k in (1, 2, 3)] == [2, 0, 2]
+    assert result.final("g.p[2].v") == 7
+
+
+def test_an_integer_that_equals_a_value_for_a_while_is_a_condition_of_when(tmp_path):
+    (tmp_path / "lines.mo").write_text(TEXT)
+    result = simulate(load_modelica(tmp_path / "lines.mo")["Lines.Steps"](), stop=3.0)
+    assert [float(result.at(t, "counted")) for t in (0.5, 1.5, 2.5)] == [0, 10, 10]
+
+
+STEPS = """package Grafcet
+  model Step
+    output Boolean active, localActive;
+    Boolean newActive;
+    input Boolean set, reset;
+    parameter Boolean first = false;
+  initial equation
+    active = first;
+    pre(newActive) = pre(localActive);
+  equation
+    active = localActive;
+    localActive = pre(newActive);
+    newActive = set or localActive and not reset;
+    when false then
+      terminate("never");
+    end when;
+  end Step;
+  model Whole
+    Step a(first = true), b;
+    Boolean fire;
+  equation
+    fire = a.localActive and time > 1;
+    a.set = false;
+    a.reset = fire;
+    b.set = fire;
+    b.reset = false;
+  end Whole;
+end Grafcet;
+"""
+
+
+def test_an_initial_value_reaches_what_it_equals_before_the_start(tmp_path):
+    (tmp_path / "steps.mo").write_text(STEPS)
+    result = simulate(load_modelica(tmp_path / "steps.mo")["Grafcet.Whole"](), stop=2.0)
+    states = [[float(result.at(t, f"{name}.active")) for t in (0.5, 1.5)] for name in "ab"]
+    assert states == [[1, 0], [0, 1]]
