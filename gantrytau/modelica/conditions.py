@@ -8,6 +8,7 @@ from gantrytau.modelica.references import dotted, nodes_of, references
 
 BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
+SAMPLE = "next_sample"  # begins the name of what holds the next instant of a `sample`
 AT_START = "initial"  # a keyword, which no component has as its name
 BEHIND, TURN = (
     "before_",
@@ -131,7 +132,7 @@ def followed_name(kind: str, name: str) -> str:
 def sample_name(call: tree.Expression) -> str:
     """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
     assert isinstance(call, tree.Call)
-    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
+    kind = SAMPLE if call.function.parts[0][0] == "sample" else "ends"
     return f"{kind}_{call.at}" if call.arguments else AT_START
 
 

@@ -50,14 +50,21 @@ def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
 class Members(Protocol):
     """An instance of a class: a component, a package with its constants, or what a function computes with."""
 
+    @property
+    def instance_name(self) -> str:
+        """Its path behind the name of the whole model."""
+        ...
+
     def has(self, name: str) -> bool:
         """Whether its class has a component of that name."""
+        ...
 
     def member(self, name: str) -> Any:
         """The value of a component."""
 
     def names(self) -> Sequence[str]:
         """Names of its components."""
+        ...
 
     def shape(self, name: str) -> tuple[int, ...] | None:
         """The sizes of a component; None where only its value has them."""
@@ -73,9 +80,11 @@ class Members(Protocol):
 
     def type_of(self, reference: tree.ComponentReference) -> str:
         """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
+        ...
 
     def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
         """The least and the greatest value of an Integer; None for a Boolean."""
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         """Whether it holds parameters and constants only."""
+        ...

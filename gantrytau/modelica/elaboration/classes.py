@@ -368,8 +368,7 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
-        # a value before the start is what is set there
-        reader = replace(reader, settled=starts and not initial)
+        reader = replace(reader, settled=starts and not initial)  # pre(x) is what is set at the start
         try:
             if starts and (steps or not initial):
                 named = set(targets(items)) - held if initial else held.intersection(targets(items))

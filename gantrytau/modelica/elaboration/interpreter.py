@@ -311,11 +311,11 @@ class Interpreter:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
             return time >= self.members.next_sample(e)
+        if name == "getInstanceName":
+            return self.members.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
-        if name == "getInstanceName":
-            return getattr(self.members, "structure", self.members).instance_name
         if name == "initial":
             return self.members.next_sample(e) > 0.5
         if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):

@@ -32,6 +32,10 @@ class PlacedMembers:
     def has(self, name: str) -> bool:
         return name in self.names()
 
+    @property
+    def instance_name(self) -> str:
+        return self.structure.instance_name if self.structure else type(self.instance).__name__
+
     def names(self) -> Sequence[str]:
         return self.structure.names() if self.structure else [*type(self.instance).members()]
 

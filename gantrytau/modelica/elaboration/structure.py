@@ -305,9 +305,7 @@ class ClassMember:
     @cached_property
     def follows(self) -> bool:
         """Whether its value is computed from that of such a parameter."""
-        vars(self)["follows"] = (
-            False  # while it is asked for: a circle is told where its values are asked for
-        )
+        vars(self)["follows"] = False  # while it is asked for: circles are told with their values
         said = self.full
         found = references(said.value) if isinstance(said.value, tree.TreeNode) else []
         leaves = [(said.node or self.owner).leaf(one) for one in found]

@@ -13,6 +13,7 @@ from gantrytau.language.functions import floor, if_else, logic_and, logic_not, l
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
+    SAMPLE,
     Items,
     changed_in,
     checks_in,
@@ -180,7 +181,7 @@ def begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
 def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
     """What is set at the start, and what a sample makes of it where its first instant is the start."""
     given = {one.dep(0).name(): one for one in own}
-    instants = [one for one in ca.symvar(sampled.condition) if "next_sample_" in one.name()]
+    instants = [one for one in ca.symvar(sampled.condition) if SAMPLE in one.name()]
     first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
     for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
         left = scalar.dep(0)
