@@ -6,7 +6,7 @@ VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 LOCK := pyproject.toml constraints.txt
 
-.PHONY: demo test test-all bench docs lint style types pytest clean
+.PHONY: demo test test-all bench library-results docs lint style types pytest clean
 
 demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
@@ -26,6 +26,10 @@ test-all: test
 
 bench: $(VENV)/installed-bench
 	OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.benchmarks
+
+# Examples of the libraries in MODELICAPATH beside the trajectories in REFERENCE_RESULTS; ONLY=Package.Of.Some.
+library-results: $(VENV)/installed-dev
+	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.library_results
 
 # Notebooks are executed again only where they, or the packages, have changed.
 docs: $(VENV)/installed-docs

@@ -207,12 +207,12 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 
 def _of_users(trace: TracebackType | None) -> TracebackType | None:
-    """A traceback without the frames of this toolkit."""
+    """A traceback without the frames of this toolkit, and of the context managers in which it tells errors."""
     if trace is None:
         return None
     rest = _of_users(trace.tb_next)
     package = str(trace.tb_frame.f_globals.get("__name__")).split(".")[0]
-    if package.startswith("gantrytau"):
+    if package.startswith("gantrytau") or package == "contextlib":
         return rest
     return TracebackType(rest, trace.tb_frame, trace.tb_lasti, trace.tb_lineno)
 

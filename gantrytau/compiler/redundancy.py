@@ -15,13 +15,14 @@ import numpy as np
 from gantrytau.border.refusal import InitializationError, StructureError
 from gantrytau.compiler.aliases import Reduced, eliminate_aliases
 from gantrytau.compiler.parameters import ParameterTable
-from gantrytau.compiler.refusals import open_loops
+from gantrytau.compiler.refusals import more_held, nearest_words, open_loops
 from gantrytau.compiler.start.balance import balance
 from gantrytau.compiler.start.consistency import solve_levels
 from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues, start_values
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.statements import Equation
+from gantrytau.language.symbols import time
 
 RANK = 1e-7  # of a row of length one, beyond the span of others, below which it repeats them
 CLOSED = 1e-12  # residual of a pose beyond which ranks seen there are not trusted
@@ -88,8 +89,8 @@ def without_redundant(
         closed = _close(constraints, guess, guess.values, flat.name)
     except InitializationError as error:
         _refuse_drives(flat, table, constraints, guess)
-        _refuse_starts(flat, constraints, guess)
-        raise open_loops(flat, error, _nearest(constraints, guess)) from None
+        near = _refuse_starts(flat, constraints, guess)
+        raise open_loops(flat, error, _nearest(constraints, guess), near) from None
     if course:
         matrices = [_over_course(constraints, course)[-1]]
     else:
@@ -315,23 +316,34 @@ def _refuse_drives(
     _refuse_conflicts(flat, constraints, closed, kept)
 
 
-def _refuse_starts(flat: FlatModel, constraints: Constraints, guess: StartValues) -> None:
-    """StructureError where loops stay open because more starts are fixed than can move, seen where they close without."""
+def _refuse_starts(flat: FlatModel, constraints: Constraints, guess: StartValues) -> str:
+    """StructureError where loops stay open because more starts are fixed, or joints driven, than can move, seen where they
+    close without. Otherwise the nearest starts with which they close, "" where there are none.
+    """
+    level = constraints.level
     fixed = [n for n in constraints.moving if n in guess.fixed]
-    if not fixed:
-        return
+    driven: dict[int, str] = {}  # row of an equation of one joint and the time: the joint
+    for row, residual in enumerate(level.residuals[: constraints.firm]):
+        leaves = {leaf.name() for leaf in ca.symvar(residual)}
+        own = leaves.intersection(constraints.moving)
+        if time.name() in leaves and len(own) == 1:
+            driven[row] = own.pop()
+    if not fixed and not driven:
+        return ""
+    rest = [row for row in range(len(level.residuals)) if row not in driven]
+    rows, titles = (tuple(part[row] for row in rest) for part in (level.residuals, level.names))
+    loose = replace(constraints, level=Level(rows, titles, level.unknowns))
     try:
-        closed = _close(constraints, replace(guess, fixed=frozenset()), guess.values, flat.name)
+        closed = _close(loose, replace(guess, fixed=frozenset()), guess.values, flat.name)
     except InitializationError:
-        return
-    _, sizes, right = np.linalg.svd(_matrix(_jacobian(constraints, closed)))
-    free = right[np.count_nonzero(sizes > RANK) :, [constraints.moving.index(n) for n in fixed]]
+        return ""
+    held = [*fixed, *driven.values()]
+    _, sizes, right = np.linalg.svd(_matrix(_jacobian(loose, closed)))
+    free = right[np.count_nonzero(sizes > RANK) :, [loose.moving.index(n) for n in held]]
     mobility = int(np.linalg.matrix_rank(free, tol=RANK)) if len(free) else 0
-    if mobility < len(fixed):
-        raise StructureError(
-            f"{flat.name}: found {len(fixed)} fixed starts, of {', '.join(fixed)}, where loops leave mobility {mobility} "
-            f"to these. Expected at most {mobility}, or values that agree: fix fewer, with Start(...) for the others"
-        )
+    if mobility < len(held):
+        raise more_held(flat.name, fixed, {level.names[row]: n for row, n in driven.items()}, mobility)
+    return nearest_words({n: (guess.values[n], closed[n]) for n in fixed})
 
 
 def _beyond(rows: np.ndarray, others: np.ndarray) -> np.ndarray:

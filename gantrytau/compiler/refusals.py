@@ -13,6 +13,7 @@ from gantrytau.language.statements import Equation
 from gantrytau.language.symbols import split_derivative
 
 CLOSED = 1e-6  # m or rad by which a loop that can be closed may be missed, where the nearest place is sought
+NEAR = 1e-6  # of a start, that is none to tell of
 MOST_SUSPECTS = 12  # inputs that are tried as unknowns, where equations are too many
 
 
@@ -195,11 +196,12 @@ def held_together(title: str, names: Sequence[str], why: str) -> StructureError:
 
 
 def open_loops(
-    flat: FlatModel, error: InitializationError, nearest: Mapping[str, float]
+    flat: FlatModel, error: InitializationError, nearest: Mapping[str, float], starts: str
 ) -> InitializationError:
     """Which loops stay open and by how much, where the failure is one of closing.
 
-    nearest: what is left of the closing equations, by name, where the loops are nearest to closed.
+    nearest: what is left of the closing equations, by name, where the loops are nearest to closed; starts: words on fixed
+    ones with which they close.
     """
     words = []
     for loop in flat.loops:
@@ -223,6 +225,32 @@ def open_loops(
         )
     return InitializationError(
         f"{flat.name}: {'; '.join(words)}. Expected frames that meet: correct lengths, offsets or joint axes, or, if it "
-        "can be closed, give start values of its joints nearer to that",
+        f"can be closed, give start values of its joints nearer to that{starts}",
         residuals=error.residuals,
     )
+
+
+def more_held(title: str, fixed: Sequence[str], driven: Mapping[str, str], mobility: int) -> StructureError:
+    """Fixed starts and driven joints, by the equations that drive, which are more than loops leave free."""
+    parts = []
+    if fixed:
+        parts.append(f"{len(fixed)} fixed starts, of {', '.join(fixed)}")
+    if driven:
+        joints = ", ".join(f"{joint} by {equation}" for equation, joint in driven.items())
+        parts.append(f"{len(driven)} driven joints, {joints}")
+    ways = ["fix fewer, with Start(...) for the others"] if fixed else []
+    ways += ["leave one drive out, or drive by a force"] if driven else []
+    return StructureError(
+        f"{title}: found {' and '.join(parts)}, where loops leave mobility {mobility} to these. Expected at most "
+        f"{mobility}, or values that agree: {'; '.join(ways)}"
+    )
+
+
+def nearest_words(starts: Mapping[str, tuple[float, float]]) -> str:
+    """Consistent values near fixed starts, as the end of a message; "" where none has to move."""
+    moved = [
+        f"{n} = {near:.6g} in place of {value:.6g}"
+        for n, (value, near) in starts.items()
+        if abs(near - value) > NEAR * max(1.0, abs(value))
+    ]
+    return f"; consistent near these starts: {', '.join(moved)}" if moved else ""

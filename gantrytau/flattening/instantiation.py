@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -118,6 +119,7 @@ class _Growing(Instance):
                 )
             instance.__dict__[name] = value
         self.paths[id(instance)] = path
+        instance.__dict__["_around"] = weakref.ref(around[-1]) if around else None
         for name in modifications:
             check_member(cls, name, f"{path} ({cls.__name__})" if path else cls.__name__)
             if is_setting(getattr(cls, name), name):

@@ -24,6 +24,7 @@ class RunStatistics:
     evaluations, jacobians: calls of the right-hand side, and Jacobians that were factored.
     restarts: how often an integrator started anew, in steps of first order: at events, samples and looks for events.
     events: condition or `when` in the model's names -> how often it turned or acted.
+    samples: period of `sampled` variables, s -> at how many instants they were sampled.
     sizes: state -> below this size its errors are absolute.
     seconds: processor time by what it was spent on, s.
     limiting: state -> share of the output intervals in which it bends most by its size, largest first: by these states the
@@ -36,6 +37,7 @@ class RunStatistics:
     jacobians: int = 0
     restarts: int = 0
     events: dict[str, int] = field(default_factory=dict)
+    samples: dict[float, int] = field(default_factory=dict)
     sizes: dict[str, float] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     limiting: dict[str, float] = field(default_factory=dict)
@@ -68,6 +70,7 @@ class RunStatistics:
             ("restarts", f"{self.restarts}"),
             ("events", f"{sum(self.events.values())}"),
             *((f"  {name}", f"{n}") for name, n in self._most(self.events)),
+            *((f"samples every {period:.6g} s", f"{n}") for period, n in sorted(self.samples.items())),
             *((f"step limited by {name}", f"{n:.0%}") for name, n in self._most(self.limiting)),
             *((name, f"{s:.3g} s") for name, s in self.seconds.items()),
         ]

@@ -34,6 +34,7 @@ class Series:
     modes: names of the values 0, 1, ... of a scalar, by its name.
     shapes: what the components of the model look like, by names.
     displays: scalar or vector name -> the unit in which figures and tables show it, where that is not its own.
+    limits: declared min and max of scalars by name, infinite where there is none.
 
     Elements `tool.r[0]` to `tool.r[2]` make up the vector `tool.r`, (times, 3), and `R[0,0]` to `R[2,2]` the
     matrix `R`, (times, 3, 3). `time` is a name, too.
@@ -54,6 +55,7 @@ class Series:
         modes: Mapping[str, Sequence[str]] | None = None,
         shapes: Iterable[Shape] = (),
         displays: Mapping[str, str] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
     ):
         self._time = np.array(time, dtype=float)
         if self._time.ndim != 1 or self._time.size == 0 or not np.all(np.diff(self._time) >= 0):
@@ -66,6 +68,7 @@ class Series:
         self._units = dict(units or {})
         self._descriptions = dict(descriptions or {})
         self._displays = {name: text for name, text in (displays or {}).items() if text}
+        self._limits = dict(limits or {})
         self._title = title
         self._aliases = dict(aliases or {})
         self._held = frozenset(held)
@@ -105,6 +108,11 @@ class Series:
     def held(self) -> frozenset[str]:
         """Names of scalars that hold their values from one time to the next, and are drawn as steps."""
         return self._held
+
+    @property
+    def limits(self) -> Mapping[str, tuple[float, float]]:
+        """Declared min and max of scalars by name."""
+        return self._limits
 
     @property
     def modes(self) -> Mapping[str, tuple[str, ...]]:
@@ -228,6 +236,7 @@ class Series:
         own["instants"] = self._instants.select(some) if self._instants is not None and some else None
         own["modes"] = {name: words for name, words in self._modes.items() if name in values}
         own |= dict(shapes=self._shapes, displays={name: self.display(name) for name in values})
+        own["limits"] = {name: ends for name, ends in self._limits.items() if name in values}
         return type(self)(self._time, values, units=units, descriptions=words, **own)
 
     def __repr__(self) -> str:

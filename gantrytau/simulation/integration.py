@@ -101,7 +101,7 @@ class Run:
         return trail.t[places], trail.rows(places)
 
     def count_events(self) -> None:
-        """Add to the statistics how often each condition turned so far, and each when acted."""
+        """Add to the statistics how often each condition turned so far, each when acted, and each clock sampled."""
         whens, own = self.coordinates.rounds.whens, self.coordinates.rounds.of
         asked = {k for conditions in own for k in conditions}
         size = len(self.coordinates.switches)
@@ -112,6 +112,10 @@ class Run:
                 self.work.count(self.changes.conditions(np.array([k]))[0], turns[k])
         for when, acts in zip(whens, self.changes.acts.tolist(), strict=True):
             self.work.count(when.label, acts)
+        due, periods = self.trail.due[: self.done + 1], self.trail.periods
+        for period in np.unique(periods).tolist():
+            instants = int(np.count_nonzero(due[:, periods == period].any(axis=1)))
+            self.work.samples[period] = self.work.samples.get(period, 0) + instants
 
     @property
     def ended(self) -> str:

@@ -71,4 +71,5 @@ def joined(parts: Sequence[Result], grid: np.ndarray) -> Result:
     words = {name: first.description(name) for name in names}
     own: dict[str, Any] = dict(title=first.title, held=first.held, ended=parts[-1].ended, modes=first.modes)
     own |= dict(shapes=first.shapes, displays={name: first.display(name) for name in names})
+    own["limits"] = first.limits
     return Result(times, values, units=first.units, descriptions=words, **own)

@@ -16,8 +16,8 @@ LEAST_STEPS = 500  # of a run between looks for singular poses and switches, wha
 class Trail:
     """Places in order of time: t (n,) in s, which repeats where something jumps, before and behind; x, z: states and
     algebraics, a row each; held: what is held from there on, sampled variables, discretes, then modes; due: which of the
-    first are sampled there; driven: inputs that are given by samples, behind their jumps; stops: whether an integration
-    ends there; kept: whether results show a place.
+    first are sampled there; periods: of these, s; driven: inputs that are given by samples, behind their jumps; stops:
+    whether an integration ends there; kept: whether results show a place.
     """
 
     def __init__(
@@ -38,8 +38,8 @@ class Trail:
         watched = watched or coordinates.curved
         mesh = np.unique(np.concatenate([fine if watched else grid, knots]))
         table, events = coordinates.dae.table, coordinates.dae.flat.sampled
-        periods = coordinates.kept("periods", lambda: np.array([table.number(s.period) for s in events]))
-        found = instants(mesh, coordinates.held, periods)
+        self.periods = coordinates.kept("periods", lambda: np.array([table.number(s.period) for s in events]))
+        found = instants(mesh, coordinates.held, self.periods)
         self.t, self.due = found.mesh, found.due
         self.driven = self._values(self.t)
         before = self._doubled(max(grid.size, LEAST_STEPS), len(coordinates.switches) > 0)

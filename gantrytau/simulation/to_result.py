@@ -10,6 +10,7 @@ from gantrytau.border.dimensions import per_second
 from gantrytau.compiler.translated import Translated
 from gantrytau.language.symbols import derivative_name, split_derivative, time
 from gantrytau.results.result import Result
+from gantrytau.simulation.between.passed_limits import limited
 from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau.simulation.full_coordinates import Coordinates
 
@@ -42,7 +43,7 @@ def result_of(
     units, words = labels(dae)
     modes = {n: own for n, own in dae.flat.modes.items() if n in table}
     own: dict[str, Any] = dict(title=dae.name, held=steps, ended=ended, modes=modes, shapes=dae.flat.shapes)
-    own["displays"] = displays(dae)
+    own |= dict(displays=displays(dae), limits=limits(dae))
     if instants is not None and steps:
         own["instants"] = _held_at(coordinates, steps, *instants)
     return Result(times, table, units=units, descriptions=words, **own)
@@ -125,6 +126,14 @@ def _labels(dae: Translated) -> tuple[dict[str, str], dict[str, str]]:
             units[name] = per_second(units[base], order)
             words[name] = f"derivative of {base}"
     return units, words
+
+
+def limits(dae: Translated) -> dict[str, tuple[float, float]]:
+    """Declared min and max of variables, element by element, infinite where there is none."""
+    found: dict[str, dict[str, float]] = {}
+    for name, side, _, limit in limited(dae.flat):
+        found.setdefault(name, {"min": -np.inf, "max": np.inf})[side] = dae.number(limit)
+    return {name: (ends["min"], ends["max"]) for name, ends in found.items()}
 
 
 def displays(dae: Translated) -> dict[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.results.display_units import DECLARED, Display, Shown, shown_units
+from gantrytau.results.passages import Passage, passages
 from gantrytau.results.series import Series
 
 LARGEST = 5e7  # numbers of a page
@@ -69,12 +70,18 @@ def packed(
     _small_enough(runs, chosen)
     variables: dict[tuple[str, str], dict[str, Any]] = {}
     held = [DistinctSignals() for _ in runs]
-    for k, (run, scalars) in enumerate(zip(runs, chosen, strict=True)):
+    for k, (run, scalars, title) in enumerate(zip(runs, chosen, titles, strict=True)):
         shown = shown_units(run, ("time", *scalars), display, DECLARED, "browse")
         for name in scalars:
             said = variables.setdefault((name, shown[name].unit), _told(run, name, shown[name], len(runs)))
             said["runs"][k] = _reference(run, name, held[k])
             _as_bands(run, name, said)
+        for one in passages(run):
+            told_of = variables.get((one.name, shown[one.name].unit)) if one.name in shown else None
+            if told_of is not None:
+                told_of.setdefault("beyond", []).append(
+                    _beyond(one, shown[one.name], title if len(runs) > 1 else "")
+                )
     total = sum(len(columns.signals) * run.time.size for run, columns in zip(runs, held, strict=True))
     bits = next(few for most, few in BITS if total <= most)
     blocks: list[bytes] = []
@@ -153,7 +160,19 @@ def _told(run: Series, name: str, shown: Shown, runs: int) -> dict[str, Any]:
         said["scale"] = [one - zero, zero]
     if name in run.held:
         said["held"] = 1
+    if name in run.limits:
+        said["limits"] = [float(shown.of(end)) if np.isfinite(end) else None for end in run.limits[name]]
     return said
+
+
+def _beyond(found: Passage, shown: Shown, run: str) -> str:
+    """How a variable passes a limit, in words: which run, which limit, when and by how much."""
+    limit, worst = float(shown.of(found.limit)), float(shown.of(found.worst))
+    unit = f" {shown.unit}" if shown.unit.strip("1") else ""
+    return (
+        f"{f'{run}: ' if run else ''}beyond its {found.side} of {limit:.6g}{unit} from t = {found.time:.5g} s, by up to "
+        f"{abs(worst - limit):.3g}{unit}"
+    )
 
 
 def _reference(run: Series, name: str, columns: DistinctSignals) -> Reference:

@@ -54,6 +54,7 @@ from gantrytau_optimica.learning import (
 )
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.predictive.mpc import Mpc
 from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.problem.optimization import (
     Free,
@@ -97,6 +98,7 @@ __all__ = [
     "Measurements",
     "MissingGuess",
     "MotionLog",
+    "Mpc",
     "NormOptimal",
     "Optimization",
     "Optimum",

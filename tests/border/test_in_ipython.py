@@ -45,6 +45,34 @@ def test_tracebacks_have_the_frames_of_the_user_alone_with_the_cause(shell, caps
     )  # the error itself keeps all frames
 
 
+LIBRARY = """
+from contextlib import contextmanager
+from gantrytau import ModelError
+
+@contextmanager
+def telling():
+    try:
+        yield
+    except ZeroDivisionError as error:
+        raise ModelError("divided by zero") from error
+
+def library():
+    with telling():
+        1 / 0
+"""
+
+
+def test_context_managers_of_the_library_are_not_shown(shell, capsys):
+    names = {"__name__": "gantrytau.made"}
+    exec(LIBRARY, names)
+    shell.push({"library": names["library"]})
+    shell.run_cell("library()")
+    shown = capsys.readouterr().out
+    assert "ModelError: divided by zero" in shown
+    assert "contextlib" not in shown
+    assert "1 / 0" not in shown
+
+
 class Falling(Model):
     """A variable and its derivative."""
 

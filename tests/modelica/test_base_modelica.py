@@ -165,3 +165,29 @@ def test_base_modelica_has_one_model(tmp_path):
 def test_a_tree_of_base_modelica_is_written():
     tree = read_tree(HERE / "base.mo")
     assert read(written(tree)) == tree
+
+
+INSTANTS = """model M
+  Boolean up = time > 1.2;
+  Integer whole = integer(time), n(start=0), changes(start=0), first(start=0);
+equation
+  when sample(0, 0.5) and up then
+    n = pre(n) + 1;
+  elsewhen time >= 2 then
+    n = pre(n) + 100;
+  end when;
+  when change(whole) or change(up) then
+    changes = pre(changes) + whole - pre(whole);
+  end when;
+  when {initial(), sample(1, 1)} then
+    first = pre(first) + 1;
+  end when;
+end M;
+"""
+
+
+def test_whens_of_text_come_back(tmp_path):
+    (tmp_path / "instants.mo").write_text(INSTANTS)
+    results = round_trip(load_modelica(tmp_path / "instants.mo")["M"](), 2.75, tmp_path)
+    for found in results:
+        assert [found.final(name) for name in ("n", "changes", "first")] == [3, 2, 3]

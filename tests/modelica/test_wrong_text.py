@@ -57,6 +57,21 @@ WRONG = (  # text of a model, line and column, words
 FUNCTION = "function f\n  input Real u[2];\n  output Integer n = integer(u[1]);\nend f;\n"
 MEANINGS = (  # where a wrong model would run: text, line and column, words
     (
+        "model M\n  Real x = sin(Integer(time));\nend M;",
+        "2:16",
+        "found Real in Integer\\(\\), expected a value of an enumeration",
+    ),
+    (
+        "model M\n  input Real u;\n  Real y;\nalgorithm\n  u := 2;\n  y := u;\nend M;",
+        "5:3",
+        "found the input 'u' assigned, expected a variable",
+    ),
+    (
+        "model M\n  parameter Real p = 1;\n  Real y;\nalgorithm\n  p := 2;\n  y := p;\nend M;",
+        "5:3",
+        "found the parameter 'p' assigned, expected a variable",
+    ),
+    (
         "model M\n  Real x = Integer(time);\nend M;",
         "2:12",
         "found Real in Integer\\(\\), expected a value of an",

@@ -47,6 +47,14 @@ def test_steps_of_both_methods_are_counted():
     assert finer.steps > 1.5 * simulate(Turning(), stop=1.0).statistics.steps
 
 
+def test_samples_are_counted_by_their_period():
+    for points in (11, 501):
+        work = simulate(Held(), stop=0.1, points=points).statistics
+        assert work.samples == {0.004: 26}  # at 0 and at 0.1 s, too
+    assert "samples every 0.004 s" in str(work)
+    assert simulate(Ball(), stop=0.1).statistics.samples == {}
+
+
 def test_what_was_not_simulated_has_none():
     with pytest.raises(ModelError, match="result of simulate"):
         _ = Result([0.0], {"x": 1.0}).statistics

@@ -12,7 +12,7 @@ from notebooks.site.builder.broken_links import broken_links
 from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import by_task, error_pages
 from notebooks.site.builder.generated.reference_pages import reference_pages, unplaced
-from notebooks.site.builder.generated.thesis_page import found, items
+from notebooks.site.builder.generated.thesis_page import thesis_pages
 from notebooks.site.builder.places import ROOT, modules
 from notebooks.site.builder.reading.docstrings import markdown, summary
 from notebooks.site.builder.reading.error_catalogue import messages, split
@@ -125,27 +125,12 @@ def test_the_catalogue_holds_what_the_sources_raise():
     assert sum(map(len, by_task().values())) == len(messages())
 
 
-def test_the_thesis_has_its_figures_and_tables():
-    numbers = {kind: [one.number for one in items() if one.kind == kind] for kind in ("figure", "table")}
-    assert len(numbers["table"]) == len(set(numbers["table"])) == 19
-    assert len(numbers["figure"]) == len(set(numbers["figure"])) >= 66
-
-
-@pytest.mark.parametrize(
-    "item", [one for one in items() if one.call], ids=lambda one: f"{one.kind} {one.number}"
-)
-def test_calls_of_the_thesis_page_are_there(item):
-    assert item.names
-    assert all(found(name) is not None for name in item.names)
-    assert (ROOT / item.page).exists()
-
-
 def test_pages_of_trees_are_there():
     pages = {
         *handwritten().values(),
         *dict(reference_pages()),
         "messages/index.md",
-        "thesis/index.md",
+        *dict(thesis_pages({})),
         "command_line/index.md",
         "sources/index.md",
         "gallery/index.md",

@@ -132,3 +132,17 @@ def test_without_webgl_curves_are_drawn(tab, tmp_path):
     tab.open(file, element="body[data-ready]")
     assert "has no WebGL" in texts(tab, "#scene")[0]
     assert len(texts(tab, ".panel")) > 0
+
+
+def test_what_is_beyond_its_limits_is_marked_listed_and_shaded(tab, tmp_path):
+    limited = Result(
+        T, {"a.turned": T, "a.held": T}, limits={"a.turned": (-np.inf, 2.5)}, units={"a.turned": "rad"}
+    )
+    seen(tab, browse(limited, first=["a.turned"], display={"a.turned": "rad"}), tmp_path)
+    tab.run("document.querySelector('#search').value = 'beyond'; document.querySelector('#search').oninput()")
+    assert texts(tab, ".row .name") == ["a.turned"]
+    words = "beyond its max of 2.5 rad from t = 2.5 s, by up to 1.5 rad"
+    assert words in tab.run("document.querySelector('.row').title")
+    assert tab.run("document.querySelector('.entry .beyond').title") == words
+    stretches = "Curves.beyond(Panels.panels[0].curves[0], 0, 4)"
+    assert tab.run(stretches) == [[3, 4]]

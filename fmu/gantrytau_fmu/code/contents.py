@@ -39,6 +39,11 @@ class Contents:
     structure: ModelStructure
     terminals: tuple[FmuTerminal, ...]
 
+    @property
+    def limited(self) -> tuple[FmuVariable, ...]:
+        """The variables with a min or max."""
+        return tuple(v for v in self.variables if v.min is not None or v.max is not None)
+
 
 def fmi_name(name: str) -> str:
     """`der(der(x))` is `der(x,2)` in the structured naming convention (FMI 3.0.2, section 2.4.7.5.1)."""

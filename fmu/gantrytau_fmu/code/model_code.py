@@ -13,6 +13,7 @@ from gantrytau_fmu.code.formulas import Formulas
 from gantrytau_fmu.code.impulse_formulas import ImpulseFormulas
 from gantrytau_fmu.code.model_graph import ARRAYS, ModelGraph, is_seldom
 from gantrytau_fmu.code.operations import number_text
+from gantrytau_fmu.description import FmuVariable
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +45,7 @@ def model_code(
         GT_HAS_MODEL_EXCHANGE=int("model-exchange" in set(interfaces)),
         GT_HAS_CO_SIMULATION=int("co-simulation" in set(interfaces)),
         GT_TOLERANCE=number_text(tolerance),
+        GT_LIMITS=len(contents.limited),
         **_sizes(model, len(contents.entries), pieces),
     )
     lines = [
@@ -153,6 +155,8 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         f"static const char gt_variable_names[][{max(len(v.name) for v in variables) + 1}] = {{",
         *(f"  {_quoted(v.name)}," for v in variables),
         "};",
+        f"static const gt_limit gt_limits[] = {{{', '.join(map(_limit, contents.limited)) or '{0, 0, 0, 0}'}}};",
+        _texts("gt_limit_units", [f" {v.unit}" if v.unit not in ("", "1") else "" for v in contents.limited]),
         _numbers("gt_constants", contents.constants),
         _numbers("gt_start_x", at["x"]),
         _numbers("gt_start_u", at["u"]),
@@ -207,6 +211,12 @@ def _of_impulses(impulses: ImpulseFormulas) -> list[str]:
         _integers("gt_unknown_ends", impulses.levels.ends),
         _integers("gt_state_symbols", impulses.states),
     ]
+
+
+def _limit(variable: FmuVariable) -> str:
+    low = "-INFINITY" if variable.min is None else number_text(variable.min)
+    high = "INFINITY" if variable.max is None else number_text(variable.max)
+    return f"{{{variable.reference}, {low}, {high}, {number_text(variable.nominal or 1.0)}}}"
 
 
 def _quoted(text: str) -> str:

@@ -239,6 +239,7 @@ static gt_status gt_call_completed(gt_component *c, int *turned) {
     if (status < GT_DISCARD) status = gt_fail(c, gt_remember(c->it));
 #endif
     *turned = 0;
+    if (status < GT_DISCARD) gt_tell_limits(c->it);
     if (GT_GAPS && status < GT_DISCARD && gt_look_at_gaps(c->it, &gaps) == GT_OK) {
         gt_tighten(c->it, &gaps);
         *turned = gt_lies_behind(c->it, &gaps);

@@ -27,6 +27,9 @@ typedef struct {
     int index;
 } gt_variable; /* its name is in gt_variable_names */
 
+/* The declared min and max of a variable, infinite where there is none; size: its nominal. */
+typedef struct { unsigned reference; double min, max, size; } gt_limit;
+
 typedef enum { /* bits, so that a call can name all modes in which it is allowed */
     GT_INSTANTIATED = 1, GT_INITIALIZATION = 2, GT_EVENT = 4, GT_CONTINUOUS = 8, GT_STEP = 16, GT_TERMINATED = 32,
     GT_FAILED = 64
@@ -52,6 +55,7 @@ static gt_status gt_get(gt_instance *it, unsigned reference, double *value);
 static double *gt_place(gt_instance *it, unsigned reference, double value);
 static gt_status gt_set(gt_instance *it, unsigned reference, double value);
 static gt_status gt_get_integer(gt_instance *it, unsigned reference, int *value);
+static void gt_tell_limits(gt_instance *it); /* a warning in the log, once for each variable beyond its min or max */
 
 /* ---- initialize.c */
 static void gt_setup(gt_instance *it, int tolerance_defined, double tolerance, double start, int stop_defined, double stop);

@@ -122,10 +122,15 @@ static gt_status gt_initialize(gt_instance *it) {
     status = gt_check_clocks(it);
     if (status == GT_OK) status = gt_begin_modes(it);
     if (status == GT_OK) status = gt_begin_whens(it);
-    if (status == GT_OK && !it->cosimulation) return gt_get_rates(it, rates); /* samples are taken in the first event mode */
+    if (status == GT_OK && !it->cosimulation) { /* samples are taken in the first event mode */
+        status = gt_get_rates(it, rates);
+        if (status == GT_OK) gt_tell_limits(it);
+        return status;
+    }
     gt_keep_before(it, 0);
     it->now.waiting = GT_CLOCKS > 0;
     if (status == GT_OK) status = gt_update(it, &info);
     if (status == GT_OK) status = gt_get_rates(it, rates);
+    if (status == GT_OK) gt_tell_limits(it);
     return status;
 }

@@ -107,6 +107,7 @@ struct gt_instance {
     int resting; /* at the start: what is told of the states holds behind what turns there */
     const char *last_event; /* name of the variable */
     double rows[GT_ROOM(GT_STATES)];
+    unsigned char beyond[GT_ROOM(GT_LIMITS)]; /* whether it was told */
 };
 
 static const char *const gt_category_names[] = GT_CATEGORY_NAMES;
@@ -176,6 +177,7 @@ static void gt_reset(gt_instance *it) {
     memcpy(it->now.solved_u, gt_start_u, GT_KNOWN * sizeof(double));
     memcpy(it->now.solved_z, gt_start_z, GT_ALGEBRAICS * sizeof(double));
     memcpy(it->now.m, gt_start_m, GT_MODES * sizeof(double));
+    memset(it->beyond, 0, sizeof it->beyond);
     it->now.tolerance = GT_TOLERANCE;
     it->now.stale = 1;
     it->mode = GT_INSTANTIATED;

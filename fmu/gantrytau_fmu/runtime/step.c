@@ -313,6 +313,7 @@ static gt_status gt_step(gt_instance *it, double time, double size, double *reac
     }
     if (status == GT_OK && !it->now.ended) status = gt_finish(it);
     it->stepping = 0;
+    if (status == GT_OK) gt_tell_limits(it);
     if (status != GT_OK && !it->now.stale) gt_step_back(it);
     it->time = it->now.time;
     *reached = it->now.time;

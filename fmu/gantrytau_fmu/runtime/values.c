@@ -128,3 +128,24 @@ static gt_status gt_set(gt_instance *it, unsigned reference, double value) {
     it->now.stale = it->outputs_stale = 1;
     return GT_OK;
 }
+
+#define GT_BEYOND 1e-6 /* of a limit or value, as in `simulate`: less is rounding, or the give of an end stop */
+
+static void gt_tell_limits(gt_instance *it) {
+    int i;
+    for (i = 0; i < GT_LIMITS; i++) {
+        const gt_limit *limit = gt_limits + i;
+        const gt_variable *variable = gt_variables + limit->reference;
+        double value, end, room;
+        if (it->beyond[i] || (variable->kind == GT_OUTPUT && gt_get_outputs(it) != GT_OK)) continue;
+        value = (variable->kind == GT_OUTPUT ? it->y : variable->kind == GT_STATE ? it->now.x
+                 : variable->kind == GT_PARAMETER ? it->now.p : it->now.u)[variable->index];
+        end = value < limit->min ? limit->min : limit->max;
+        room = GT_BEYOND * fmax(fmax(fabs(end), fabs(value)), 1e-3 * limit->size);
+        if (!(limit->min - value > room || value - limit->max > room)) continue;
+        it->beyond[i] = 1;
+        gt_say(it, GT_WARNING, GT_LOG_WARNING, "%s: %s passes its %s of %.6g%s and is %.6g%s at time = %.9g s, %.3g beyond; "
+               "this is told once", GT_NAME, gt_name(limit->reference), value < limit->min ? "min" : "max", end,
+               gt_limit_units[i], value, gt_limit_units[i], it->now.time, fabs(value - end));
+    }
+}

@@ -19,7 +19,7 @@ CART_COLOURS = ("#1f77b4", "#d95f02", "#2a9d5c")
 BRANCH_COLOUR = "#b5179e"
 
 
-def draw_paths(optima: "Mapping[str, Optimum]", file: Path) -> "Figure":
+def draw_paths(optima: "Mapping[str, Optimum]", file: Path | None = None) -> "Figure":
     """The paths of the tool, from above and from the side (thesis Figure 3.9), the best branch besides."""
     import matplotlib.pyplot as plt
 
@@ -36,7 +36,7 @@ def draw_paths(optima: "Mapping[str, Optimum]", file: Path) -> "Figure":
     return _saved(figure, file)
 
 
-def draw_torques(optima: "Mapping[str, Optimum]", limit: float, file: Path) -> "Figure":
+def draw_torques(optima: "Mapping[str, Optimum]", limit: float, file: Path | None = None) -> "Figure":
     """The motor torques over time as played back, with their limits (thesis Figure 3.10)."""
     import matplotlib.pyplot as plt
 
@@ -71,7 +71,7 @@ def draw_six_links(optimum: "Optimum", limit: float, file: Path) -> "Figure":
 def _titles(optima: "Mapping[str, Optimum]") -> dict[str, str]:
     """Motions of the L1 by key, with their durations."""
     titles = {row.key: row.title for row in ROWS} | {BRANCH: BRANCH_TITLE}
-    return {key: f"{title}: {optima[key].final_time:.3f} s" for key, title in titles.items()}
+    return {key: f"{title}: {optima[key].final_time:.3f} s" for key, title in titles.items() if key in optima}
 
 
 def _view(axis: "Axes", optimum: "Optimum", across: int, view: str) -> None:
@@ -97,10 +97,11 @@ def _inputs(axis: "Axes", optimum: "Optimum", name: str, word: str, limit: float
     axis.grid(alpha=0.3)
 
 
-def _saved(figure: "Figure", file: Path) -> "Figure":
+def _saved(figure: "Figure", file: Path | None) -> "Figure":
     import matplotlib.pyplot as plt
 
-    with replacing(file) as partial:
-        figure.savefig(partial, dpi=150)
+    if file is not None:
+        with replacing(file) as partial:
+            figure.savefig(partial, dpi=150)
     plt.close(figure)
     return figure

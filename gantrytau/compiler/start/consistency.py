@@ -23,6 +23,7 @@ POLISHED = 3  # times that steps relative to each unknown follow, where rounding
 ATTEMPTS = 6  # with other values, where the given ones do not lead to a solution
 SPREAD = 0.3  # of the first of them
 MOST_PIECES = 60  # that are tried
+MOST_NAMES = 8  # unknowns that a failure names
 
 
 def solve_levels(
@@ -250,8 +251,14 @@ def _scaled_rows(rows: np.ndarray | float, f: np.ndarray, jacobian: Matrix) -> t
 def _failure(level: Level, f: np.ndarray, bad: np.ndarray, title: str) -> InitializationError:
     order = sorted(np.flatnonzero(bad), key=lambda i: -abs(f[i]) if np.isfinite(f[i]) else -np.inf)
     worst = "; ".join(f"{level.names[i]} is off by {f[i]:.3g}" for i in order[:5])
+    rows, columns = level.entries
+    inside = {level.leaves[c] for r, c in zip(rows, columns, strict=True) if r in order[:5]}
+    names = [n for n in level.unknowns if n in inside]
+    unknowns = ", ".join(names[:MOST_NAMES]) + (
+        f" and {len(names) - MOST_NAMES} more" if names[MOST_NAMES:] else ""
+    )
     return InitializationError(
-        f"{title}: no consistent start found. Worst residuals: {worst}. Expected 0: change the start values "
-        "or the parameters (is a length out of reach?), or release a fixed start",
+        f"{title}: no consistent start found. Worst residuals: {worst}. Unknowns there: {unknowns}. Expected 0: change "
+        "the start values or the parameters (is a length out of reach?), or release a fixed start",
         residuals={level.names[i]: float(f[i]) for i in order},
     )

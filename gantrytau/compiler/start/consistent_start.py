@@ -8,6 +8,7 @@ import casadi as ca
 from gantrytau.border.refusal import InitializationError
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
+from gantrytau.compiler.refusals import nearest_words
 from gantrytau.compiler.start.consistency import solve_levels
 from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues
@@ -81,7 +82,7 @@ def _consistent_start(
         try:
             values = solve_levels([indexed.whole], guess.values, held=fixed, started=started, title=title)
         except InitializationError:
-            raise error from None
+            raise _with_nearest(error, stages, guess, started, title) from None
     if flat.initial_equations and not held:
         if free not in indexed.with_initial:
             indexed.with_initial[free] = _initial_level(flat, reduced, stages)
@@ -89,6 +90,20 @@ def _consistent_start(
             [indexed.with_initial[free]], values, held=fixed, started=guess.started, title=title
         )
     return values
+
+
+def _with_nearest(
+    error: InitializationError, stages: list[Level], guess: StartValues, started: frozenset[str], title: str
+) -> InitializationError:
+    """The failure with the nearest values of fixed starts that are consistent, where there are some."""
+    try:
+        near = solve_levels(
+            stages, guess.values, held=frozenset(), started=started, title=title, thorough=True
+        )
+    except InitializationError:
+        return error
+    words = nearest_words({n: (guess.values[n], near[n]) for n in sorted(guess.fixed) if n in near})
+    return InitializationError(f"{error}{words}", residuals=error.residuals)
 
 
 def refuse_outside(

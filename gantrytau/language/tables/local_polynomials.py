@@ -81,12 +81,17 @@ def polynomials(x: np.ndarray, weights: np.ndarray, kind: str, outside: str) -> 
     bare = _spline(x, weights, kind)
     spline = type(bare)(bare.t, weights, bare.k)
     breaks = bare.t[bare.k : bare.t.size - bare.k]
+    coefficients = np.array([spline(breaks[:-1], k) / factorial(k) for k in range(bare.k, -1, -1)])
+    return pieces(breaks, coefficients, spline(breaks[[0, -1]], 1), outside, kind == "spline")
+
+
+def pieces(
+    breaks: np.ndarray, coefficients: np.ndarray, slopes: np.ndarray, outside: str, smooth: bool = True
+) -> Polynomials:
+    """Polynomials between breaks (n,), coefficients (order + 1, n - 1, functions); slopes (2, functions) at the ends."""
     edges, origins = breaks[1:-1], breaks[:-1]
-    coefficients = np.array([spline(origins, k) / factorial(k) for k in range(bare.k, -1, -1)])
-    slopes = np.array([coefficients[-2, 0], spline(breaks[-1], 1)]) * (outside == "linear")
     if not edges.size:  # numbers of a table are known by their choice
         edges, origins = breaks.mean(keepdims=True), np.repeat(origins, 2)
         coefficients = np.repeat(coefficients, 2, axis=1)
-    return Polynomials(
-        edges, origins, coefficients, float(breaks[0]), float(breaks[-1]), slopes, kind == "spline"
-    )
+    ends = slopes * (outside == "linear")
+    return Polynomials(edges, origins, coefficients, float(breaks[0]), float(breaks[-1]), ends, smooth)

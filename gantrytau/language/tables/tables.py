@@ -62,18 +62,25 @@ def _value(
     """The table at scalar arguments."""
     weights = interpolating(axes[0], values, kind)
     if len(axes) == 1:
-        (value,), beyond = polynomials(axes[0], weights[:, None], kind, outside).at(at[0])
+        (value,), _ = polynomials(axes[0], weights[:, None], kind, outside).at(at[0])
     else:
         weights = interpolating(axes[1], weights.T, kind).T
-        rows, left = polynomials(axes[0], np.eye(axes[0].size), kind, outside).at(at[0])
-        columns, beyond = polynomials(axes[1], np.eye(axes[1].size), kind, outside).at(at[1])
+        (rows, _), (columns, _) = (
+            polynomials(axis, np.eye(axis.size), kind, outside).at(one)
+            for one, axis in zip(at, axes, strict=True)
+        )
         value = ca.dot(ca.vertcat(*rows), ca.DM(weights) @ ca.vertcat(*columns))
-        beyond = beyond + left - beyond * left
-    if outside != "error":
-        return value
-    for one, axis in zip(at, axes, strict=True):
-        note_range(one, float(axis[0]), float(axis[-1]))
-    return value * ca.sqrt(1 - 2 * beyond)  # nan beyond the ends
+    if outside == "error":
+        for one, axis in zip(at, axes, strict=True):
+            value = only_within(value, one, axis)
+    return value
+
+
+def only_within(value: Any, at: ca.SX, axis: np.ndarray) -> Any:
+    """A value at an argument, nan beyond the ends of its axis, where simulations stop."""
+    low, high = float(axis[0]), float(axis[-1])
+    note_range(at, low, high)
+    return value * ca.sqrt(1 - 2 * ((at < low) + (at > high)))
 
 
 def _applied(function: Callable[..., ca.SX], arguments: tuple[Any, ...]) -> Any:

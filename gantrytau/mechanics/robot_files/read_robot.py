@@ -1,11 +1,12 @@
 """`read_urdf`, `read_mjcf`, `read_sdf`: robots from files as classes of components."""
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from gantrytau import ModelError
+from gantrytau import DoubtfulResult, InitializationError, ModelError, StructureError, translate
 from gantrytau.mechanics.robot_files.loop_file import read_closure
 from gantrytau.mechanics.robot_files.mjcf_file import read_mjcf_file
 from gantrytau.mechanics.robot_files.robot_class import DescribedRobot, robot_class
@@ -91,4 +92,30 @@ def _made(robot: RobotDescription, packages: Folders, driven: Names, reader: str
         robot = replace(robot, driven=tuple(driven))
     folders = MeshFolders(robot.file, packages or {})
     lost = missing_meshes(robot.links, folders)
-    return robot_class(replace(robot, left_out=(*robot.left_out, *lost)), folders)
+    robot = replace(robot, left_out=(*robot.left_out, *lost))
+    return robot_class(_as_meant(robot, folders) if robot.loops or robot.closed else robot, folders)
+
+
+def _as_meant(robot: RobotDescription, folders: MeshFolders) -> RobotDescription:
+    """The robot, or, where its loops stay open by angles such as 3.1416, with the quarter turns that these stand for."""
+    meant = robot.meant
+    pairs = (*zip(robot.joints, meant.joints, strict=True), *zip(robot.loops, meant.loops, strict=True))
+    names = [one.name for one, other in pairs if one != other]
+    if not names or _closes(robot, folders) or not _closes(meant, folders):
+        return robot
+    warnings.warn(
+        f"{robot.file}: the loops of {robot.name} stay open with the angles of {', '.join(names)} as they are written, and "
+        "close with quarter turns, which are taken; write these with all digits, 1.5707963267948966, 3.141592653589793",
+        DoubtfulResult,
+        stacklevel=4,
+    )
+    return meant
+
+
+def _closes(robot: RobotDescription, folders: MeshFolders) -> bool:
+    """Whether the robot can be assembled."""
+    try:
+        translate(robot_class(robot, folders)())
+    except (StructureError, InitializationError):
+        return False
+    return True

@@ -46,6 +46,11 @@ class Placement:
         return Placement.of(np.array(self.xyz) + self.R @ inner.xyz, self.R @ inner.R)
 
     @property
+    def meant(self) -> "Placement":
+        """The same with quarter turns in place of angles that are these but for their last digit, such as 3.1416."""
+        return Placement(self.xyz, tuple(map(_meant, self.rpy)))
+
+    @property
     def inverse(self) -> "Placement":
         """The pose of the outer frame in this one."""
         return Placement.of(-self.R.T @ self.xyz, self.R.T)
@@ -56,6 +61,13 @@ def turned(n: np.ndarray, angle: float) -> np.ndarray:
     length = np.linalg.norm(n)
     cross = np.cross(np.eye(3), n / length if length > 0 else n)
     return np.eye(3) + np.sin(angle) * cross + 2 * np.sin(angle / 2) ** 2 * cross @ cross
+
+
+def _meant(angle: float) -> float:
+    """A quarter turn, or several, that an angle is written for, cut or rounded after three digits or more; else itself."""
+    exact = np.pi / 2 * np.round(angle / (np.pi / 2))
+    digits = len(repr(float(angle)).partition(".")[2])
+    return float(exact) if exact and digits > 2 and abs(angle - exact) <= 10.0**-digits else angle
 
 
 def _about_x(angle: float) -> np.ndarray:
@@ -191,3 +203,10 @@ class RobotDescription:
         )
         driven = self.driven if driven is None else driven
         return replace(self, joints=joints, loops=(*self.loops, *loops), driven=driven)
+
+    @property
+    def meant(self) -> "RobotDescription":
+        """The same with quarter turns in all joints where the file has these rounded."""
+        joints = (replace(one, placement=one.placement.meant, seat=one.seat.meant) for one in self.joints)
+        loops = (replace(one, origin_a=one.origin_a.meant, origin_b=one.origin_b.meant) for one in self.loops)
+        return replace(self, joints=tuple(joints), loops=tuple(loops))

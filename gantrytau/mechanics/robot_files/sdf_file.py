@@ -260,6 +260,12 @@ class _Reader:
             return Placement()
         if pose.get("rotation_format") == "quat_xyzw":
             x, y, z, qx, qy, qz, qw = self.xml.read_numbers(pose, pose.text or "", 7, f"<pose>{pose.text}")
+            if not any((qx, qy, qz, qw)):
+                raise self.xml.refusal(
+                    pose,
+                    f"the quaternion {qx:g} {qy:g} {qz:g} {qw:g}",
+                    "one with a direction, 0 0 0 1 for none",
+                )
             return Placement.of_quaternion((x, y, z), (qw, qx, qy, qz))
         numbers = self.xml.read_numbers(pose, pose.text or "", 6, f"<pose>{pose.text}")
         unit = np.pi / 180 if pose.get("degrees") in TRUE else 1.0

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -9,13 +10,15 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.statements import Items, looped
+from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
-from gantrytau.modelica.table_functions import external_value
+from gantrytau.modelica.elaboration.whens import when_chains
+from gantrytau.modelica.external.functions import check_known, external_value
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -28,12 +31,13 @@ class LeftBlock(Exception):
 class Execution:
     """A run of statements. reader: evaluates their expressions; known: the values of what is assigned, None before.
 
-    shapes: the sizes of what is declared with sizes.
+    shapes: the sizes of what is declared with sizes; left: by `break` and `return`, whether what follows is left out.
     """
 
     reader: Interpreter
     known: dict[str, Any] = field(default_factory=dict)
     shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    left: dict[str, Any] = field(default_factory=lambda: {"break": False, "return": False})
 
     def run(self, items: Items, local: Mapping[str, Any] | None = None) -> None:
         """Carry out statements, one after another; local: values of the iterators around them."""
@@ -79,6 +83,7 @@ class Execution:
                         target.at,
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
+                self._refuse_given(target, reader)
                 wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
@@ -86,9 +91,32 @@ class Execution:
                 try:
                     if target.parts == ((name, ()),):
                         self._check_shape(name, one)
-                    self.known[name] = _with(self.known[name], target.parts, one, reader)
+                    found = _with(self.known[name], target.parts, one, reader)
+                    for gone in self.left.values():
+                        found = found if gone is False else _chosen(gone, self.known[name], found, name)
+                    self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
+
+    def acting(self, items: Items, reader: Interpreter) -> Iterator[Any]:
+        """The actions of a branch of `when` in an algorithm of a model."""
+        run = Execution(replace(reader, local=self.reader.local), dict(self.known), self.shapes)
+        for item in items:
+            if isinstance(item, tree.ProcedureCall):
+                yield action_of(item.call, replace(reader, local={**self.reader.local, **run.known}))
+            else:
+                run.run([item])
+        for name in dict.fromkeys(targets(items)):
+            yield ca.SX(values.to_casadi(reader.members.member(name))) == values.to_casadi(run.known[name])
+
+    def _refuse_given(self, target: tree.ComponentReference, reader: Interpreter) -> None:
+        """TextError where what is assigned is known from outside."""
+        name = target.parts[0][0]
+        prefixes = reader.scope.elements[name].clause.prefixes if name in reader.scope.elements else ()
+        given = next((word for word in ("input", "parameter", "constant") if word in prefixes), "")
+        if given == "input" or (given and reader.members.is_fixed(target)):
+            words = f"found the {given} '{name}' assigned, expected a variable; assign to one of another name"
+            reader.scope.refuse(target.at, words)
 
     def _check_shape(self, name: str, value: Any) -> None:
         shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
@@ -111,6 +139,7 @@ class Execution:
                 self._check_shape(name, value)
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        outer = self.left["break"]
         for inner in looped(item, reader):
             steps = {name: inner.local[name] for name, _ in item.iterators}
             try:
@@ -119,6 +148,7 @@ class Execution:
                 if str(left) == "return":
                     raise
                 break
+        self.left["break"] = outer
 
     def _while(self, item: tree.WhileLoop, local: Mapping[str, Any]) -> None:
         for _ in range(MOST_ROUNDS):
@@ -145,19 +175,29 @@ class Execution:
         if not tests:
             self.run(last, local)
             return
-        before = self.known
+        before, gone = self.known, self.left
+        self._carry_out(last, local, before, gone)
+        for test, items in reversed(tests):
+            other, left = self.known, self.left
+            self._carry_out(items, local, before, gone)
+            self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
+            self.left = {word: _chosen(test, one, left[word], word) for word, one in self.left.items()}
+        for word in (word for word, one in self.left.items() if one is True):
+            self.left = gone
+            raise LeftBlock(word)
+
+    def _carry_out(
+        self, items: Items, local: Mapping[str, Any], known: Mapping[str, Any], gone: Mapping[str, Any]
+    ) -> None:
+        """Carry out a branch from the values before it."""
+        self.known, self.left = dict(known), dict(gone)
         try:
-            self.known = dict(before)
-            self.run(last, local)
-            for test, items in reversed(tests):
-                other, self.known = self.known, dict(before)
-                self.run(items, local)
-                self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
+            self.run(items, local)
         except LeftBlock as left:
-            reader.scope.refuse(
-                item.at,
-                f"found '{left}' where the condition varies, expected a known one",
+            here = reduce(
+                lambda a, b: values.binary("and", a, values.unary("not", b)), self.left.values(), True
             )
+            self.left[str(left)] = values.binary("or", self.left[str(left)], here)
 
 
 def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
@@ -197,31 +237,33 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
 def stated_by_algorithm(
     items: Items, reader: Interpreter, wanted: Collection[str] | None = None
 ) -> Iterator[Any]:
-    """The equations that an algorithm of a model amounts to: one for each variable that it assigns, or each wanted one."""
-    names = dict.fromkeys(assigned(items))
-    run = Execution(reader, names, {name: shape for name in names if (shape := reader.members.shape(name))})
-    run.run(items)
-    for name, value in run.known.items():
+    """What an algorithm of a model amounts to: whens, and an equation for each variable assigned, or for each wanted."""
+    whens = [one for one in items if isinstance(one, tree.Branching) and one.word == "when"]
+    held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
+    names = [n for n in dict.fromkeys(targets(items)) if n not in held]
+    run = Execution(reader, dict.fromkeys(names))
+    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.shape(n))}
+    run.known |= {n: reader.members.member(n) for n in held}
+    old = {n: values.called("pre", [one], {}) for n, one in run.known.items() if n in held}
+    for item in items:
+        if item in whens:
+            before = replace(run, known={**run.known, **old})
+            yield from when_chains(
+                item, replace(reader, local={**reader.local, **before.known}), before.acting
+            )
+            for name in (n for _, inner in item.branches for n in targets(inner)):
+                old.pop(name, None)  # what follows has its new value
+        else:
+            run.run([item])
+    for name in names:
         if wanted is not None and name not in wanted:
             continue
-        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(value)
+        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(run.known[name])
         if right is None:
             raise ModelError(
                 f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
         yield ca.SX(left) == right
-
-
-def assigned(items: Items) -> Iterator[str]:
-    """Names of the variables that statements set."""
-    for item in items:
-        if isinstance(item, tree.Assignment):
-            yield from (target.parts[0][0] for target in item.targets if target is not None)
-        elif isinstance(item, (tree.ForLoop, tree.WhileLoop)):
-            yield from assigned(item.items)
-        elif isinstance(item, tree.Branching):
-            for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from assigned(inner)
 
 
 def called_class(
@@ -259,10 +301,7 @@ def called_class(
     if record:
         return RecordValue(run.known)
     if external is not None:
-        reader = replace(run.reader, local=run.known)
-        return external_value(
-            external.function or definition.name, [reader.value(e) for e in external.arguments]
-        )
+        return _external(scope, external, run)
     try:
         for section in scope.sections:
             run.reader = replace(run.reader, scope=section.scope)
@@ -275,6 +314,20 @@ def called_class(
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
     return found if len(found) != 1 else first_result(found)
+
+
+def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:
+    """The value of an external function, whose outputs may stand among the arguments."""
+    name = external.function or scope.definition.name
+    check_known(name)
+    outputs = {n for n, e in scope.elements.items() if "output" in e.clause.prefixes}
+    reader = replace(run.reader, local=run.known)
+    given = [e for e in external.arguments if not _names_one(e, outputs)]
+    return external_value(name, [reader.value(e) for e in given], scope.root.inherited_class)
+
+
+def _names_one(e: tree.Expression, names: Collection[str]) -> bool:
+    return isinstance(e, tree.ComponentReference) and e.parts[0][0] in names
 
 
 def _is_open(value: Any) -> bool:

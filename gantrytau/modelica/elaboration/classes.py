@@ -1,8 +1,9 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, cast
 
 import casadi as ca
 
@@ -12,23 +13,37 @@ from gantrytau.language.events import WhenChain
 from gantrytau.language.model import Connector, Declared, Model, Outer
 from gantrytau.language.symbols import der
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.algorithms import assigned, stated_by_algorithm
+from gantrytau.modelica.conditions import (
+    AT_START,
+    BEHIND,
+    TURN,
+    calls_before,
+    changed_in,
+    checks_in,
+    first_valued,
+    followed_name,
+    gives_value_before,
+    guarded_samples,
+    instants,
+    sample_calls,
+    sample_name,
+    targets,
+)
+from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
-from gantrytau.modelica.elaboration.placed import AT_START, Bound, PlacedMembers, sample_name
+from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
-    BEFORE,
     AbsentComponent,
-    at_start,
-    first_valued,
-    instants,
     remembers,
-    sample_calls,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
-from gantrytau.modelica.references import nodes_of
+from gantrytau.modelica.elaboration.whens import at_start, follows
+from gantrytau.modelica.references import dotted, nodes_of
+
+TAKEN = "a name that is taken, expected another name"
 
 
 class TextClass(Declared):
@@ -74,6 +89,9 @@ class ModelicaModel(TextClass, Model):
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
             yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+        for name in _followed(self.structure):
+            old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
+            yield follows(reduce(getattr, name.split("."), self), old, turn)
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
                 yield der(getattr(self, name)) == 0
@@ -125,7 +143,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         if name in kind._taken or name.startswith("_"):
             scope.refuse(
                 one.element.declaration.at,
-                f"found a component '{name}', a name that is taken, expected another name",
+                f"found a component '{name}', {TAKEN}",
             )
         if not one.present or one.is_object:
             body[name] = None
@@ -140,6 +158,18 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
         start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
         body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
+    body["_followed"] = (*_followed(structure), *map(sample_name, guarded_samples(_whens(structure))))
+    for name in body["_followed"]:
+        body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
+    for name in _followed(structure):
+        body[followed_name(BEHIND, name)] = Discrete(0, description=f"{name} before an instant")
+    taken = next((n for n in structure.members if isinstance(body.get(n), Discrete) and n not in held), None)
+    if taken is not None:
+        scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
+    for call in (
+        call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
+    ):
+        body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
@@ -200,15 +230,7 @@ def _held(structure: Structure) -> Iterator[str]:
                 yield left.parts[0][0]
     for item in _whens(structure):
         for _, items in item.branches:
-            left = list(items)
-            for one in left:
-                if isinstance(one, tree.ForLoop):
-                    left += one.items
-                targets = (one.left,) if isinstance(one, tree.SimpleEquation) else ()
-                for target in targets:
-                    for each in target.items if isinstance(target, tree.OutputList) else (target,):
-                        if isinstance(each, tree.ComponentReference):
-                            yield each.parts[0][0]
+            yield from targets(items)
 
 
 def _asked_before(structure: Structure) -> set[str]:
@@ -216,12 +238,31 @@ def _asked_before(structure: Structure) -> set[str]:
     tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
     calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
-    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] in BEFORE]
+    asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
     known = (structure.members.get(name) for name in names)
     return {
         one.name for one in known if one and one.kind == "Boolean" and not one.is_parameter and not one.shape
     }
+
+
+def _followed(structure: Structure) -> list[str]:
+    """Variables that Discretes follow, as values before an instant are asked for beside those behind it."""
+    branches = [branch for item in _whens(structure) for branch in item.branches]
+    changes = {name for test, items in branches for name in changed_in(test, items)}
+    alone = {id(one) for test, _ in branches for one in instants(test)}
+    said = [one.element.declaration.modification for one in structure.members.values()]
+    found: list[str] = []
+    for call in calls_before([said, [section.items for section in structure.scope.sections]]):
+        asked, name = call.function.parts[0][0], dotted(call.arguments[0])
+        one = structure.leaf(cast(tree.ComponentReference, call.arguments[0]))
+        if one is None or one.is_parameter or one.shape or (asked == "edge" and id(call) in alone):
+            continue
+        number = one.kind == "Integer" or one.literals is not None
+        beside = asked != "pre" or name in changes or (number and name not in _held(structure))
+        if beside and (number or one.kind == "Boolean"):
+            found.append(name)
+    return [*dict.fromkeys(found)]
 
 
 def _all_sections(structure: Structure) -> Iterator[StatementSection]:
@@ -312,14 +353,16 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
         items = [one for one in section.items if not any(one is other for other in structure.started)]
         if starts and not steps:
             items = (
-                [i for i in items if first_valued(i) not in held] if initial else _set_by_whens(items, held)
+                [i for i in items if first_valued(i) not in held and not gives_value_before(i)]
+                if initial
+                else _set_by_whens(items, held)
             )
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
         reader = structure.interpreter(section.scope, PlacedMembers(instance))
         try:
             if starts and (steps or not initial):
-                named = set(assigned(items)) - held if initial else held.intersection(assigned(items))
+                named = set(targets(items)) - held if initial else held.intersection(targets(items))
                 found = stated_by_algorithm(items, reader, named) if named else ()
             else:
                 found = (stated_by_algorithm if steps else stated)(items, reader)

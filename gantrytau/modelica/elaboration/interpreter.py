@@ -8,11 +8,13 @@ import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean, in_words
-from gantrytau.language.symbols import time
+from gantrytau.language.functions import logic_or
+from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+from gantrytau.modelica.references import dotted
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -37,6 +39,12 @@ class Members(Protocol):
     def next_sample(self, call: tree.Call) -> Any:
         """The next instant of a `sample`; of `initial()` whether it is the start, 1 or 0."""
 
+    def before(self, name: str, asked: str) -> Any:
+        """The Discrete that follows a variable of that dotted name, as `pre`, `edge` or `change` asks; None without one."""
+
+    def turn(self, name: str) -> Any:
+        """The parity of the changes of a variable that a Discrete follows; None for another one."""
+
     def type_of(self, reference: tree.ComponentReference) -> str:
         """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
         ...
@@ -60,6 +68,11 @@ class Surroundings(Protocol):
         """The value of a function, or of the constructor of a record; several results as a tuple."""
 
 
+def changed(new: Any, old: Any) -> Any:
+    """Whether a Boolean, Integer or number of an enumeration is another one."""
+    return logic_or(new > old + 0.5, new < old - 0.5)
+
+
 def first_result(value: Any) -> Any:
     """The first of several results of a function, which is its value in an expression."""
     return next(iter(value), None) if isinstance(value, tuple) else value
@@ -70,7 +83,8 @@ class Interpreter:
     """Evaluates expressions of a class in an instance.
 
     local: values of iterators and of what a function computes; end: the size that `end` means; quiet: no events;
-    settled: values before an instant are those behind it.
+    settled: values before an instant are those behind it; following: inside of a `when`, the variables whose changes are its
+    condition.
     """
 
     scope: ClassScope
@@ -80,6 +94,7 @@ class Interpreter:
     end: int | None = None
     quiet: bool = False
     settled: bool = False
+    following: frozenset[str] | None = None
 
     def with_local(self, **values: Any) -> "Interpreter":
         """The same with further iterators."""
@@ -274,6 +289,8 @@ class Interpreter:
         )
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
+        if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
+            return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
             (place,) = places
@@ -281,6 +298,27 @@ class Interpreter:
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value
+
+    def _varies(self, subscript: tree.Expression, size: int) -> bool:
+        """Whether a subscript is known while a model runs only."""
+        if isinstance(subscript, (tree.Mark, tree.Number)):
+            return False
+        found = replace(self, end=size).value(subscript)
+        return isinstance(found, ca.SX) and not found.is_constant()
+
+    def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
+        """The elements of an array at places of which some vary, the last one beyond all."""
+        (first, *rest), size = subscripts, len(value)
+        if not self._varies(first, size):
+            chosen = self.places(first, size)
+            each = [self.indexed(value[k], rest) for k in ([chosen] if isinstance(chosen, int) else chosen)]
+            return each[0] if isinstance(chosen, int) else values.array(each)
+        place = replace(self, end=size).value(first)
+        each = [self.indexed(one, rest) for one in value]
+        found = each[-1]
+        for k in reversed(range(size - 1)):
+            found = values.chosen(place < k + 1.5, each[k], found, self.quiet)
+        return found
 
     def places(self, subscript: tree.Expression, size: int) -> int | list[int]:
         """Indices from 0 that a subscript chooses of so many; ModelError beyond."""
@@ -311,10 +349,13 @@ class Interpreter:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
         if name == "sample":
             return time >= self.members.next_sample(e)
-        if self.settled and name in ("pre", "edge", "change"):
-            return self.value(e.arguments[0]) if name == "pre" else False
+        before = name in ("pre", "edge", "change") and len(e.arguments) == 1
+        if before and (found := self._before(name, e.arguments[0])) is not None:
+            return found
         if name == "initial":
             return self.members.next_sample(e) > 0.5
+        if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
+            inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = self.function(e)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
@@ -325,6 +366,20 @@ class Interpreter:
                 f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
             )
         return arguments[0] if name == "pure" else values.called(name, arguments, named)
+
+    def _before(self, asked: str, e: tree.Expression) -> Any:
+        """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""
+        name = dotted(e)
+        inside = self.following is not None and name in self.following
+        old = self.members.before(name, "edge" if inside else asked) if name else None
+        if self.settled and (asked == "pre" or old is None):
+            return self.value(e) if asked == "pre" else False
+        if old is None:
+            return None
+        old, new = old if self.following is None else pre(old), self.value(e)
+        if asked == "pre":
+            return old
+        return new > old + 0.5 if asked == "edge" else changed(new, old)
 
     def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
         """The name of the function that is called, and its class; None for one of the language."""

@@ -10,7 +10,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
 
 BOOLEANS = frozenset({"edge", "change", "initial", "terminal", "sample"})
-INTEGERS = frozenset({"size", "ndims", "integer", "Integer"})
+INTEGERS = frozenset({"size", "ndims", "integer", "Integer", "cardinality"})
 OF_ARGUMENT = {"pre": 0, "noEvent": 0, "smooth": 1, "homotopy": 0, "delay": 0, "abs": 0, "sum": 0, "fill": 0}
 
 
@@ -115,6 +115,8 @@ def _type_of_call(e: tree.Call, reader: Interpreter) -> str:
         return type_of(e.arguments[OF_ARGUMENT[name]], reader)
     elements = function.elements if function is not None else {}
     outputs = [n for n, one in elements.items() if "output" in one.clause.prefixes]
+    for one in () if e.iterators else (*e.arguments, *(value for _, value in e.named)):
+        type_of(one, reader)  # what stands in it is told here
     if function is None or not outputs:
         return ""
     first = tree.ComponentReference(e.at, ((outputs[0], ()),))

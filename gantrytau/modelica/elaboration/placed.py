@@ -1,27 +1,25 @@
 """Instances with symbols, and values of Modelica text that are computed in them."""
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.language.declarations import Formula
-from gantrytau.language.model import Declared
+from gantrytau.language.declarations import Discrete, Formula
+from gantrytau.language.model import Connector, Declared
+from gantrytau.language.statements import Connection
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
-from gantrytau.modelica.elaboration.statements import AbsentComponent
+from gantrytau.modelica.elaboration.statements import AbsentComponent, stated
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
-
-AT_START = "initial"  # a keyword, which no component has as its name
-
-
-def sample_name(call: tree.Call) -> str:
-    """The name of the Discrete that holds the next instant of a `sample`, or whether it is the start."""
-    return f"next_sample_{call.at}" if call.arguments else AT_START
+from gantrytau.modelica.references import connects_in
 
 
 class PlacedMembers:
@@ -65,11 +63,53 @@ class PlacedMembers:
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
+    def before(self, name: str, asked: str) -> Any:
+        own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
+        return None if own else self._following(BEHIND, name)
+
+    def turn(self, name: str) -> Any:
+        return self._following(TURN, name)
+
+    def _following(self, kind: str, name: str) -> Any:
+        known = getattr(type(self.instance), "_followed", ())
+        return getattr(self.instance, followed_name(kind, name)) if name in known else None
+
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)
         if not hasattr(self.instance, name):
             raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
         return getattr(self.instance, name)
+
+    def cardinality(self) -> int:
+        """The number of connections of a connector, on both sides of the component that has it."""
+        owner = self.instance
+        while isinstance(owner, Connector):
+            owner = around(owner)
+        both = (owner, around(owner))
+        return sum(_connected(one)[id(self.instance)] for one in both if one is not None)
+
+
+def around(member: Any) -> Any:
+    """The component of which an instance is a member; None for the outermost."""
+    found = vars(member).get("_around")
+    return found and found()
+
+
+def _connected(component: Any) -> Counter[int]:
+    """The number of connections that a component states of each connector, by the connector's id."""
+    if "_connected" not in vars(component):
+        structure: Structure | None = getattr(type(component), "structure", None)
+        if structure is None:
+            found = [one for one in component.equations() if isinstance(one, Connection)]
+        else:
+            members = PlacedMembers(component)
+            sections = (one for one in structure.scope.sections if one.kind == "equation")
+            readers = (
+                (connects_in(one.items), structure.interpreter(one.scope, members)) for one in sections
+            )
+            found = [one for items, reader in readers for one in stated(items, reader)]
+        component._connected = Counter(id(end) for one in found for end in (one.a, one.b))
+    return component._connected
 
 
 def _by_size(found: ca.SX) -> Any:
@@ -90,7 +130,8 @@ class Bound(Formula):
         if isinstance(found, tree.TreeNode):
             placed = PlacedMembers(scope, self.structure)
             try:
-                found = self.structure.interpreter(self.modifier.scope, placed).value(found)
+                reader = self.structure.interpreter(self.modifier.scope, placed)
+                found = replace(reader, settled=True).value(found)
             except AbsentComponent as error:
                 self.modifier.scope.refuse(self.modifier.at, f"found {error}, expected one that is there")
         found = self.modifier.picked(found)

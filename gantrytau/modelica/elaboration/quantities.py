@@ -1,5 +1,6 @@
-"""Numbers, Booleans and enumerations of Modelica text as quantities of the language, and what modifies them."""
+"""Numbers, Booleans and enumerations of text as quantities of the language; `free` and `initialGuess` of Optimica."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,22 +19,18 @@ from gantrytau.language.declarations import (
     StateSelect,
 )
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.freedom import (
-    inside_optimization,
-    is_fixed,
-    is_free,
-    refuse_free,
-    without_optimica,
-)
+from gantrytau.modelica.conditions import is_call
 from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
 NUMBERS = ("start", "min", "max", "nominal")
 TEXTS = {"unit": "unit", "displayUnit": "display"}
 IGNORED = {"quantity", "unbounded"}
+GUESS = 1.0  # of a free parameter of which nothing is said
 
 
 def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bound | None) -> None:
@@ -73,7 +70,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
         return
     words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
     kind = next((made for word, made in KINDS.items() if word in words_of), Real)
-    if is_free(one):
+    if is_free(one) and not _is_differentiated(one):
         kind = Input
     elif kind is Input and inside_optimization(structure):
         kind = Real  # which the equations around it determine
@@ -81,6 +78,13 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
     body[name] = found
+
+
+def _is_differentiated(one: ClassMember) -> bool:
+    """Whether its derivative stands in the equations of its class: a free state is one whose start is free."""
+    nodes = (node for section in one.owner.scope.sections for node in nodes_of(section.items))
+    calls = (node for node in nodes if isinstance(node, tree.Call) and is_call(node, "der"))
+    return any(x.parts[0][0] == one.name for call in calls for x in references(call.arguments))
 
 
 def _flag(one: ClassMember, name: str) -> bool:
@@ -171,3 +175,75 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
             attributes = {k: v for k, v in attributes.items() if k not in left_out}
             found[name] = attributes
     return {name: one for name, one in found.items() if one}
+
+
+def is_free(one: ClassMember) -> bool:
+    """Whether a text leaves a quantity to the optimiser."""
+    said = one.full.inner.get("free")
+    return said is not None and said.value is not None and _said(one, said)
+
+
+def refuse_free(one: ClassMember) -> None:
+    """TextError for a parameter that is left to the optimiser, but shapes the model or is no Real."""
+    if is_free(one) and (one.is_folded or one.kind != "Real"):
+        said = one.full.inner["free"]
+        shapes = "shapes the model" if one.is_folded else f"is {one.kind}"
+        said.scope.refuse(
+            said.at, f"found '{one.name}' free, which {shapes}, expected a Real on which no size depends"
+        )
+
+
+def inside_optimization(structure: Structure) -> bool:
+    """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
+    root = structure
+    while root.around is not None:
+        root = root.around
+    return root is not structure and root.scope.definition.kind == "optimization"
+
+
+def _said(one: ClassMember, said: Modifier) -> bool:
+    found = {bool(value) for value in np.ravel(one.owner.folded(said))}
+    if len(found) > 1:
+        words = f"found some elements of '{one.name}' set, expected all or none; declare two arrays"
+        said.scope.refuse(said.at, words)
+    return found.pop()
+
+
+def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifier:
+    """A modification whose initial guess is a value of a free parameter, and a start value of a variable that is not fixed.
+
+    declared: whether it is that of the declaration, where a free parameter needs a value.
+    """
+    inner = dict(said.inner)
+    guess, free = inner.pop("initialGuess", None), inner.get("free")
+    for name, attribute in (("initialGuess", guess), ("free", free)):
+        if attribute is not None and not attribute.scope.source.optimica:
+            attribute.scope.refuse(
+                attribute.at, f"found '{name}', which is Optimica, expected it in a .mop file"
+            )
+    if one.is_parameter and is_free(one):
+        guess = guess or inner.get("start")
+        if guess is not None:
+            return replace(_as_value(one, guess), inner=inner)
+        if said.value is None and declared:
+            return Modifier(_spread(one, GUESS), said.scope, inner=inner, at=said.at)
+    elif guess is not None and not is_fixed(one):
+        inner["start"] = guess
+    return replace(said, inner=inner)
+
+
+def is_fixed(one: ClassMember) -> bool:
+    """Whether the start value of a variable holds."""
+    said = one.full.inner.get("fixed")
+    return said is not None and said.value is not None and _said(one, said)
+
+
+def _as_value(one: ClassMember, guess: Modifier) -> Modifier:
+    if not (one.shape and guess.each):
+        return guess
+    number = one.owner.folded(guess.seen_from(one.owner))
+    return replace(guess, value=_spread(one, number), path=())
+
+
+def _spread(one: ClassMember, number: Any) -> Any:
+    return np.full(one.shape, number, dtype=object) if one.shape else number

@@ -10,6 +10,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import modifiers
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
 from gantrytau.modelica.optimizations import HORIZON
+from gantrytau.modelica.pulses import with_pulses
 from gantrytau.modelica.source import SourceText
 
 ELEMENT_SECTIONS = ("", "public", "protected")
@@ -273,7 +274,7 @@ class ClassScope:
         body = self.definition.body
         for one in body.sections if isinstance(body, tree.Composition) else ():
             if one.kind not in ELEMENT_SECTIONS:
-                items = tuple(i for i in one.items if not isinstance(i, tree.Element))
+                items = tuple(with_pulses(i for i in one.items if not isinstance(i, tree.Element)))
                 found.append(StatementSection(one.kind, items, self))
         return tuple(found)
 

@@ -9,20 +9,21 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Discrete
-from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_and, logic_not
+from gantrytau.language.events import Happening, WhenChain, reinit, terminate
+from gantrytau.language.functions import if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
-from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import (
+    BEFORE,
+    Items,
+    is_call,
+)
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
+from gantrytau.modelica.elaboration.whens import chosen_actions, when_chains
 from gantrytau.modelica.references import nodes_of
-
-ROUNDING = 1e-6  # of a period, by which an instant may be located early
-BEFORE = frozenset({"pre", "edge", "change"})
-Items = Sequence[tree.EquationOrStatement]
 
 
 class AbsentComponent(Exception):
@@ -55,15 +56,7 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
         for inner in looped(item, reader):
             yield from stated(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "when":
-        yield WhenChain(tuple(_when(item, reader)))
-        for call in (call for test, _ in item.branches for call in sample_calls(test)):
-            instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
-            passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
-            action = instant == pre(instant) + passed * period
-            advance = Happening(time >= instant, (action,), "sample", True)
-            first = at_start((instant == reader.value(call.arguments[0]),))
-            known = reader.members.is_fixed(call.arguments[0])
-            yield WhenChain((advance,) if known else (first, advance))
+        yield from when_chains(item, reader, _actions)
     elif isinstance(item, tree.Branching):
         yield from _branches(item, reader)
     elif isinstance(item, tree.ProcedureCall):
@@ -95,14 +88,6 @@ def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iter
         yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
 
 
-def first_valued(item: tree.EquationOrStatement) -> str:
-    """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
-    left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
-    if isinstance(left, tree.Call) and _is_call(left, "pre"):
-        (left,) = left.arguments
-    return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
-
-
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
     """Whether it is an equation of a Boolean or Integer outside of `when` that compares values beside instants."""
     if not _asks_before(item) or not isinstance(item.left, tree.ComponentReference):
@@ -111,10 +96,7 @@ def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tre
     asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
     inside = {id(one) for one in asked}
     others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
-    jumps = any(one.function.parts[0][0] in ("edge", "change") for one in calls)
-    return members.type_of(item.left) in ("Boolean", "Integer") and bool(
-        jumps or others or item.left in asked
-    )
+    return members.type_of(item.left) in ("Boolean", "Integer") and bool(others or item.left in asked)
 
 
 def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
@@ -222,6 +204,7 @@ def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     if not tests:
         yield from stated(last, reader)
         return
+    yield from _guarded_asserts(tests, last, reader)
     found = _differences(last, reader)
     for test, items in reversed(tests):
         above = _differences(items, reader)
@@ -235,10 +218,24 @@ def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
         yield one == 0
 
 
+def _guarded_asserts(tests: Sequence[tuple[Any, Items]], last: Items, reader: Interpreter) -> Iterator[Any]:
+    """The assertions of branches, each where its condition holds and none before it."""
+    before: Any = False
+    for test, items in (*tests, (True, last)):
+        here = values.binary("and", values.unary("not", before), values.condition(test))
+        for item in filter(_is_assert, items):
+            yield from _call(cast(tree.ProcedureCall, item), reader, here)
+        before = values.binary("or", before, values.condition(test))
+
+
+def _is_assert(item: tree.EquationOrStatement) -> bool:
+    return isinstance(item, tree.ProcedureCall) and item.call.function.parts[-1][0] == "assert"
+
+
 def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     """The scalar equations of a branch as differences of their sides."""
     found: list[ca.SX] = []
-    for one in stated(items, reader):
+    for one in stated([item for item in items if not _is_assert(item)], reader):
         if not isinstance(one, ca.SX):
             raise ModelError(
                 "found connect, when or assert under a condition that varies, expected equations"
@@ -247,19 +244,21 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
     return found
 
 
-def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
+def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> Iterator[Any]:
+    """The assertion that a call states; where: a condition under which it is asked for."""
     name = item.call.function.parts[-1][0]
     if name != "assert":
         raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")
     arguments = dict(zip(("condition", "message", "level"), item.call.arguments, strict=False)) | dict(
         item.call.named
     )
-    level = reader.value(arguments["level"]) if "level" in arguments else 2
+    if not _is_error(item.call, reader):
+        return
     holds, words = reader.value(arguments["condition"]), reader.value(arguments["message"])
-    if level != 2:
-        return  # a warning
+    if where is not True:
+        holds = values.binary("or", values.unary("not", where), values.condition(holds))
     if isinstance(holds, ca.SX):
-        if reader.members.is_fixed(arguments["condition"]):
+        if where is True and reader.members.is_fixed(arguments["condition"]):
             yield require(holds, words)
         else:
             yield WhenChain((Happening(logic_not(values.condition(holds)), (), words, True, words),))
@@ -267,98 +266,52 @@ def _call(item: tree.ProcedureCall, reader: Interpreter) -> Iterator[Any]:
         raise ModelError(f"found an assertion that does not hold: {words}")
 
 
-def _when(item: tree.Branching, reader: Interpreter) -> Iterator[Happening]:
-    for test, items in item.branches:
-        conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-        actions = tuple(_actions(items, reader))
-        if len(item.branches) == 1:
-            test, rest = _instant_and_rest(test)
-            conditions = (test,) if rest is not None else conditions
-            if rest is not None:
-                actions = tuple(_guarded(actions, reader.value(rest)))
-        for one in conditions:  # a chain of branches that do the same: each acts when it becomes true
-            if _is_call(one, "initial"):
-                yield at_start(actions)
-                continue
-            edge = cast(tree.Call, one).arguments[0] if _is_call(one, "edge") else one
-            found = values.condition(reader.value(edge))
-            if isinstance(found, ca.SX):
-                refuse_change(found)
-            sampled = any(sample_calls(one))
-            yield Happening(found, actions, "sample" if sampled else "", sampled, _failure(items, reader))
+def _is_error(call: tree.Call, reader: Interpreter) -> bool:
+    """Whether an `assert` is no warning."""
+    level = dict(call.named).get("level") or next(iter(call.arguments[2:]), None)
+    return level is None or reader.value(level) == 2
 
 
-def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
-    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
-    conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
-    return tuple(_instant_and_rest(one)[0] for one in conditions)
-
-
-def _instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
-    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
-    if isinstance(test, tree.Binary) and test.operator == "and":
-        for one, other in ((test.left, test.right), (test.right, test.left)):
-            if _is_call(one, "sample") or _is_call(one, "edge"):
-                return one, other
-    return test, None
-
-
-def _guarded(actions: Sequence[Any], test: Any) -> Iterator[Any]:
-    """Actions where a condition holds with the new values of what changes at the instant, else none."""
-    test = values.condition(test)
-    for one in actions:
-        if isinstance(one, Reinit):
-            yield reinit(one.variable, if_else(test, one.value, one.variable))
-        elif isinstance(one, ca.SX):
-            for scalar in one.elements():
-                yield scalar.dep(0) == if_else(test, scalar.dep(1), pre(scalar.dep(0)))
-        else:
-            raise ModelError("found terminate() beside sample() and another condition, expected another when")
-
-
-def at_start(actions: tuple[Any, ...]) -> Happening:
-    """What happens at the start and never again: a condition on the time that always holds."""
-    return Happening(time > -1e30, actions, "at the start", True)
-
-
-def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
-    """The calls of `sample` in a condition of `when`."""
-    left = [test]
-    for one in left:
-        if isinstance(one, tree.Call) and _is_call(one, "sample") and len(one.arguments) == 2:
-            yield one
-        elif isinstance(one, tree.ArrayConstructor):
-            left += one.items
-        elif isinstance(one, tree.Binary):
-            left += [one.left, one.right]
-
-
-def _is_call(e: tree.Expression, name: str) -> bool:
-    return isinstance(e, tree.Call) and e.function.parts[0][0] == name
-
-
-def _failure(items: Items, reader: Interpreter) -> str:
-    """The words of `assert(false, words)` in a branch of `when`; "" without one."""
-    calls = [one.call for one in items if isinstance(one, tree.ProcedureCall)]
-    ends = [one for one in calls if _is_call(one, "assert") and reader.value(one.arguments[0]) is False]
-    return reader.value(ends[0].arguments[1]) if ends else ""
-
-
-def _actions(items: Items, reader: Interpreter) -> Iterator[Any]:
+def _actions(items: Items, reader: Interpreter, inside: bool = False) -> Iterator[Any]:
+    """The actions of statements in a `when`; inside: under a further condition."""
     for item in items:
+        call = item.call if isinstance(item, tree.ProcedureCall) else None
         if isinstance(item, tree.SimpleEquation):
             _check_types(item, reader, assigned=True)
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):
             for inner in looped(item, reader):
-                yield from _actions(item.items, inner)
-        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "reinit":
-            variable, value = (reader.value(one) for one in item.call.arguments)
-            yield reinit(values.to_casadi(variable), values.to_casadi(value))
-        elif isinstance(item, tree.ProcedureCall) and item.call.function.parts[0][0] == "terminate":
-            yield terminate(reader.value(item.call.arguments[0]))
-        elif not _failure([item], reader):
-            reader.scope.refuse(
-                item.at, "found another statement in 'when', expected an equation, reinit or terminate"
-            )
+                yield from _actions(item.items, inner, inside)
+        elif isinstance(item, tree.Branching) and item.word == "if":
+            yield from _chosen(item, reader)
+        elif call is not None:
+            yield action_of(call, reader, inside)
+        else:
+            reader.scope.refuse(item.at, "found another statement in 'when', expected an equation or a call")
+
+
+def action_of(call: tree.Call, reader: Interpreter, inside: bool = False) -> Any:
+    """What `reinit`, `terminate` or `assert` does in a `when`; inside: under a further condition."""
+    if is_call(call, "reinit"):
+        variable, value = (reader.value(one) for one in call.arguments)
+        return reinit(values.to_casadi(variable), values.to_casadi(value))
+    if is_call(call, "terminate") and not inside:
+        return terminate(reader.value(call.arguments[0]))
+    if is_call(call, "assert"):
+        holds = reader.value(call.arguments[0]) if _is_error(call, reader) else True
+        fails = if_else(values.condition(holds), 0, 1) if isinstance(holds, ca.SX) else int(not holds)
+    elif not is_call(call, "terminate"):
+        reader.scope.refuse(call.at, "found another call in 'when', expected reinit, terminate or assert")
+    else:
+        fails = 1
+    return reader.members.next_sample(call) == fails
+
+
+def _chosen(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
+    """An `if` in a `when`."""
+    tests, last = reader.open_branches(item.branches, item.otherwise or ())
+    found: Iterable[Any] = _actions(last, reader, bool(tests))
+    for test, items in reversed(tests):
+        found = chosen_actions(values.condition(test), _actions(items, reader, True), found)
+    yield from found

@@ -18,6 +18,7 @@ from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, 
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
 from gantrytau.modelica.references import references
+from gantrytau.modelica.shaping import shaping
 
 
 @dataclass(eq=False)
@@ -63,10 +64,17 @@ class Structure:
         return [*self.scope.elements]
 
     def shape(self, name: str) -> tuple[int, ...] | None:
-        return self.members[name].shape
+        one = self.members[name]
+        return tuple(one.first_sizes) or one.shape
 
     def next_sample(self, call: tree.Call) -> Any:
         raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
+
+    def before(self, name: str, asked: str) -> Any:
+        return None
+
+    def turn(self, name: str) -> Any:
+        return None
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
@@ -123,7 +131,8 @@ class Structure:
         """Ask for all sizes, conditions and ranges, here and within, so that it is known what shapes the model."""
         self.scope.check_replaced()
         for one in self.members.values():
-            one.full  # noqa: B018  (what is final is told here)
+            if isinstance(one.full.value, tree.TreeNode) and one.present:
+                (one.full.node or self)._ask_shapes(one.full.value, one.full.scope)
             if one.present and one.is_object:
                 self.member(one.name)
             elif one.present and one.shape is not None:
@@ -146,23 +155,29 @@ class Structure:
                     self._ask_names(test, scope, local)
                 inside += items
             inside += item.otherwise or ()
+        else:
+            self._ask_shapes(item, scope, local)
         for one in inside:
             self._ask(one, scope, local)
+
+    def _ask_shapes(self, item: Any, scope: ClassScope, local: frozenset[str] = frozenset()) -> None:
+        for one in shaping(item, scope, lambda around, call: self.interpreter(around).function(call)[1]):
+            self._ask_names(one, scope, local)
 
     def _ask_names(self, expression: Any, scope: ClassScope, local: frozenset[str]) -> None:
         """Fold the parameters in an expression, unless a variable stands in it, too."""
         found = [one for one in references(expression) if one.parts[0][0] not in local]
         if all(map(self._is_known, found)):
-            for one in found:
+            for one in (one for one in found if self.has(one.parts[0][0])):
                 whole = tuple((name, ()) for name, _ in one.parts)
                 self.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
     def type_of(self, reference: tree.ComponentReference) -> str:
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         return "" if one is None else one.type_name
 
     def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
             return None
         said = [one.full.inner.get(name) for name in ("min", "max")]
@@ -178,10 +193,10 @@ class Structure:
         """Whether a reference leads to a parameter or constant."""
         if not self.has(reference.parts[0][0]):
             return reference.parts[0][0] != "time"
-        one = self._leaf(reference)
+        one = self.leaf(reference)
         return one is None or one.is_parameter
 
-    def _leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
+    def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
         here: Structure | None = self
         for name, _ in reference.parts:
@@ -199,6 +214,9 @@ class ClassMember:
     name: str
     element: Element
     owner: Structure
+    first_sizes: list[int] = field(
+        default_factory=list
+    )  # on which its further ones depend, as in A[:, size(A, 1)]
 
     @cached_property
     def over(self) -> Modifier:
@@ -327,15 +345,15 @@ class ClassMember:
         for one in self.chain:
             body = one.definition.body
             sizes += [(s, one) for s in body.subscripts] if isinstance(body, tree.ShortClass) else []
-        return tuple(self._size(size, scope, k) for k, (size, scope) in enumerate(sizes))
+        for k, (size, scope) in enumerate(sizes):
+            self.first_sizes.append(self._size(size, scope, k))
+        return tuple(self.first_sizes)
 
     def _size(self, size: tree.Expression, scope: ClassScope, dimension: int) -> int:
         if isinstance(size, tree.Mark) and size.word == ":":
             if self.full.value is None:
-                scope.refuse(
-                    size.at,
-                    f"found ':' as a size of '{self.name}' without a value, expected a value or a size",
-                )
+                words = f"found ':' as a size of '{self.name}' without a value, expected a value or a size"
+                scope.refuse(size.at, words)
             before = set(self.owner.read)
             found = np.shape(self.owner.folded(self.full))
             self.owner.read.intersection_update(before)
@@ -344,10 +362,8 @@ class ClassMember:
         if isinstance(found, np.ndarray) and found.size and isinstance(found.flat[0], EnumerationValue):
             return found.size  # an enumeration
         if isinstance(found, bool) or not isinstance(found, int) or found < 0:
-            scope.refuse(
-                size.at,
-                f"found {found!r} as a size of '{self.name}', expected a whole number of zero or more",
-            )
+            words = f"found {found!r} as a size of '{self.name}', expected a whole number of zero or more"
+            scope.refuse(size.at, words)
         return found
 
     @cached_property

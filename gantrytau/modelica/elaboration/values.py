@@ -178,6 +178,7 @@ ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
     "./": _spread(operator.truediv),
     ".^": _spread(operator.pow),
 }
+LOGICAL = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT)
 RELATIONS: Mapping[str, Callable[[Any, Any], Any]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "<>": operator.ne,
 }  # fmt: skip
@@ -211,8 +212,8 @@ def unary(sign: str, a: Any) -> Any:
 
 def condition(value: Any) -> Any:
     """A Boolean as a condition: a variable that is no Discrete is true above one half."""
-    symbolic = isinstance(value, ca.SX) and value.is_symbolic()
-    return value > 0.5 if symbolic else value
+    number = isinstance(value, ca.SX) and not any(map(value.is_op, LOGICAL))
+    return value > 0.5 if number else value
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
@@ -294,6 +295,14 @@ def _differentiated(x: Any) -> Any:
 
 
 PLAIN = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "sign")
+
+
+def _cardinality(connector: Any) -> int:
+    if not hasattr(connector, "cardinality"):
+        raise ModelError("found cardinality() of what is no connector, expected a connector with members")
+    return connector.cardinality()
+
+
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     **{name: _elementwise(getattr(ca, name)) for name in PLAIN},
     "log10": _elementwise(ca.log10),
@@ -337,12 +346,12 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "semiLinear": lambda x, above, below: if_else(x >= 0, above * x, below * x),
     "Integer": lambda value: value if isinstance(value, ca.SX) else int(value),
     "String": _written,
+    "cardinality": _cardinality,
 }  # fmt: skip
 REFUSED: Mapping[str, str] = {
     "inStream": "write a connector with flow and potential variables",
     "actualStream": "write a connector with flow and potential variables",
     "spatialDistribution": "write a chain of volumes",
-    "cardinality": "give a Boolean parameter that says whether something is connected",
     "terminal": "leave out what is done at the end",
     "getInstanceName": "write the text itself",
 }

@@ -108,6 +108,47 @@ const Curves = (() => {
     return found.filter(([begin, end]) => end > low && end > begin);
   };
 
+  // where a curve is beyond its limits between two times: [begin, end]
+  self.beyond = ({t, y, variable, ordered}, low, high) => {
+    const [least, most] = variable.limits || [null, null], found = [];
+    if (!ordered || !variable.beyond) return found;
+    const out = (value) => (least !== null && value < least) || (most !== null && value > most);
+    for (let n = Data.before(t, low); n < t.length && t[n] <= high; n++) {
+      if (!out(y[n])) continue;
+      const begin = n;
+      while (n + 1 < t.length && out(y[n + 1])) n++;
+      found.push([t[begin], t[n]]);
+    }
+    return found;
+  };
+
+  // the limits of curves as lines, and shades where these are beyond; u: the plot
+  self.limits = (u, curves, [low, high], colour) => {
+    const {ctx} = u, {left, top, width, height} = u.bbox;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(left, top, width, height);
+    ctx.clip();
+    ctx.strokeStyle = ctx.fillStyle = colour;
+    ctx.setLineDash([2, 4].map((one) => one * devicePixelRatio));
+    for (const curve of curves) {
+      ctx.globalAlpha = 0.13;
+      for (const [begin, end] of self.beyond(curve, low, high)) {
+        const from = u.valToPos(begin, "x", true);
+        ctx.fillRect(from, top, Math.max(u.valToPos(end, "x", true) - from, 1), height);
+      }
+      ctx.globalAlpha = 0.8;
+      for (const limit of (curve.variable.limits || []).filter((one) => one !== null)) {
+        const y = u.valToPos(limit, "y", true);
+        ctx.beginPath();
+        ctx.moveTo(left, y);
+        ctx.lineTo(left + width, y);
+        ctx.stroke();
+      }
+    }
+    ctx.restore();
+  };
+
   self.word = (variable, value) => variable.modes?.[value] ?? String(value);
 
   // round numbers between two limits, about so many

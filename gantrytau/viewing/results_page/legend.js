@@ -28,6 +28,7 @@ const Legend = (() => {
     const run = Data.runs.length > 1 ? make("span", "dim", Data.runs[curve.run].title) : "";
     curve.reading = make("span", "reading");
     item.append(swatch(curve), make("span", "name", variable.name), run, curve.reading);
+    if (variable.beyond) item.append(make("span", "beyond", "⚠", variable.beyond.join("\n")));
     if (panel.variables.length > 1) item.append(button("⇣", `${variable.name} in a panel of its own`, () => Panels.own(variable, panel)));
     item.append(button("×", `remove ${variable.name}`, () => Panels.remove(variable, panel)));
     return item;

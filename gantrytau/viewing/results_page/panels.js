@@ -213,7 +213,7 @@ const Panels = (() => {
       legend: {show: false},
       cursor: {points: {show: false}, y: Boolean(panel.x), drag: {x: true, y: true, uni: 25, setScale: false}, bind: {dblclick: () => null}},
       hooks: {
-        drawAxes: [(u) => shade(panel, u)], draw: [(u) => paint(panel, u)],
+        drawAxes: [(u) => shade(panel, u), (u) => panel.x || Curves.limits(u, curvesOf(panel), self.times(), style("--wrong"))], draw: [(u) => paint(panel, u)],
         setSelect: [(u) => selected(panel, u)], setCursor: [(u) => moved(panel, u)],
       },
     }, [[0, 1], [null, null]], element);

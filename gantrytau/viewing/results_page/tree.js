@@ -66,6 +66,10 @@ const Tree = (() => {
       const words = document.createElement("span");
       words.className = "dim words";
       words.textContent = variable.words || "";
+      if (variable.beyond) {
+        unit.textContent = "⚠ " + unit.textContent;
+        unit.classList.add("beyond");
+      }
       const x = document.createElement("button");
       x.className = "as-x";
       x.textContent = "x";
@@ -73,7 +77,7 @@ const Tree = (() => {
       x.onclick = (event) => { event.stopPropagation(); self.onX(variable); };
       line.append(tick, label, unit, words, x);
       line.title = `${variable.name}${variable.unit && variable.unit !== "1" ? ` [${variable.unit}]` : ""}` +
-        (variable.words ? `: ${variable.words}` : "");
+        (variable.words ? `: ${variable.words}` : "") + (variable.beyond || []).map((one) => `\n⚠ ${one}`).join("");
       line.onclick = () => self.onTick(variable);
     }
     line.onkeydown = (event) => keys(event, line);
@@ -122,7 +126,7 @@ const Tree = (() => {
     const words = wanted.toLowerCase().split(/\s+/).filter(Boolean).map((word) =>
       new RegExp(word.split("*").map((part) => part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join(".*")));
     return Data.variables.filter((variable) => {
-      const text = `${variable.name} ${variable.unit} ${variable.words || ""}`.toLowerCase();
+      const text = `${variable.name} ${variable.unit} ${variable.words || ""} ${(variable.beyond || []).join(" ")}`.toLowerCase();
       return words.every((word) => word.test(text));
     });
   }

@@ -1,4 +1,4 @@
-"""Figures 8.7 to 8.9 of a match that is led into its hole: how it is turned, forces, torques."""
+"""Figures 8.7 and 8.9 of a match that is led into its hole: forces and torques, and how it is turned."""
 
 import os
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def plot_peg_orientation(
     result: Result, file: str | os.PathLike[str] | None = None, name: str = ""
 ) -> "Figure":
-    """The angles ZYZ of the tool (Figure 8.7), and what is not singular where it points down: tilt and rotation.
+    """The angles ZYZ of the tool (Figure 8.9), and what is not singular where it points down: tilt and rotation.
 
     result: of a `PegInHole`, or of a model in which `name` leads to one; saved to `file` if one is named.
     """
@@ -36,7 +36,7 @@ def plot_peg_orientation(
 
 
 def plot_peg_forces(result: Result, file: str | os.PathLike[str] | None = None, name: str = "") -> "Figure":
-    """Forces of the tool on the hole (Figure 8.8), as they are measured and as they are, in its axes, and how deep it is."""
+    """Forces of the tool on the hole (Figure 8.7), as they are measured and as they are, in its axes, and how deep it is."""
     figure, axes = _panels(3, 7.0)
     t, at = result.time, _within(name)
     for k, letter in enumerate("xyz"):
@@ -50,7 +50,7 @@ def plot_peg_forces(result: Result, file: str | os.PathLike[str] | None = None, 
 
 
 def plot_peg_torques(result: Result, file: str | os.PathLike[str] | None = None, name: str = "") -> "Figure":
-    """Torques of the tool about the tool centre point, in its axes (Figure 8.9), and those that its sensor measures."""
+    """Torques of the tool about the tool centre point, in its axes (Figure 8.7), and those that its sensor measures."""
     figure, axes = _panels(2, 5.0)
     t, at = result.time, _within(name)
     for k, letter in enumerate("xyz"):

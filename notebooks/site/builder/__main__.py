@@ -14,16 +14,17 @@ from notebooks.site.builder.generated.error_pages import error_pages
 from notebooks.site.builder.generated.gallery_page import gallery_page
 from notebooks.site.builder.generated.reference_pages import reference_pages
 from notebooks.site.builder.generated.source_page import source_page
-from notebooks.site.builder.generated.thesis_page import thesis_page
+from notebooks.site.builder.generated.thesis_page import pictures, thesis_pages
 from notebooks.site.builder.places import BUILD, NOTEBOOKS, SITE, SOURCES, STAGE
 from notebooks.site.builder.staging import Stage, stage_handwritten
+from notebooks.site.builder.thesis_runs import made
 
 
 def main() -> int:
     """Stages, executes, builds, checks."""
     parser = argparse.ArgumentParser(prog="make docs", description=__doc__)
     parser.add_argument(
-        "--without-outputs", action="store_true", help="do not execute notebooks: a quick look"
+        "--without-outputs", action="store_true", help="execute no notebooks and calls: a quick look"
     )
     asked = parser.parse_args()
     begin = time.monotonic()
@@ -35,13 +36,14 @@ def main() -> int:
     told(begin, f"{len(drawn)} examples drawn")
     single = {
         "gallery/index.md": gallery_page(drawn),
-        "thesis/index.md": thesis_page(),
         "command_line/index.md": command_page(),
         "sources/index.md": source_page(),
     }
     for page, text in (*reference_pages(drawn), *error_pages(), *single.items()):
         stage.write(page, text)
-    told(begin, f"{len(stage.written)} pages staged; notebooks are executed")
+    told(begin, f"{len(stage.written)} pages staged; calls of the thesis are executed")
+    _stage_thesis(stage, asked.without_outputs)
+    told(begin, "notebooks are executed")
     _stage_notebooks(stage, asked.without_outputs)
     stage.clear()
     told(begin, "Sphinx builds the pages")
@@ -51,6 +53,15 @@ def main() -> int:
     print("\n".join(wrong), end="\n" if wrong else "", file=sys.stderr)
     told(begin, f"{len(wrong)} broken links" if wrong else f"the site is {SITE / 'index.html'}")
     return 1 if wrong else 0
+
+
+def _stage_thesis(stage: Stage, without_outputs: bool) -> None:
+    found = {} if without_outputs else dict(made())
+    for page, text in thesis_pages(found):
+        stage.write(page, text)
+    for item, one in found.items():
+        for path, name in zip(one.pictures, pictures(item, one), strict=True):
+            stage.copy(path, f"thesis/{name}")
 
 
 def _stage_notebooks(stage: Stage, without_outputs: bool) -> None:

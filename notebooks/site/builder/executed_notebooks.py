@@ -65,11 +65,11 @@ def _duration(path: Path) -> int:
 
 def state(source: bytes) -> str:
     """A digest of a source and of all that it could call."""
-    return hashlib.sha256(source + _state_of_packages()).hexdigest()[:16]
+    return hashlib.sha256(source + state_of_packages()).hexdigest()[:16]
 
 
 @cache
-def _state_of_packages() -> bytes:
+def state_of_packages() -> bytes:
     """A digest of all files of the packages."""
     digest = hashlib.sha256(sys.version.encode())
     for folder in PACKAGES.values():

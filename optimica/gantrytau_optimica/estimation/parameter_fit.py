@@ -14,8 +14,10 @@ from gantrytau.border.checks import number
 from gantrytau.border.refusal import did_you_mean
 from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.optimum import Optimum
+from gantrytau_optimica.control.limits import signal_limits
 from gantrytau_optimica.estimation.experiments import Experiment, courses
 from gantrytau_optimica.estimation.mesh_error import COARSE
+from gantrytau_optimica.failures.failure_report import binding
 from gantrytau_optimica.fitting.covariance import averaged_spectrum, independent_share, product_covariance
 from gantrytau_optimica.fitting.diagnostics import COMPUTED, Diagnostics, ResidualSeries, diagnose, repeated
 from gantrytau_optimica.fitting.linear import inverse_root
@@ -201,11 +203,32 @@ class ParameterFit(Record):
             if abs(correlation[i, j]) > STRONG
         ]
         found += self._mesh_words()
-        if self.limited:
-            found.append(
-                "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them"
-            )
+        found += self._limit_words() if self.limited else []
         return (*found, *(f.message for f in self.diagnostics.findings), *self._computed())
+
+    def _limit_words(self) -> list[str]:
+        """Message on the declared limits that bind, from when to when, and how far measured values lie beyond these."""
+        found = self.optimum
+        words = [
+            one for phase in found.phases.values() for one in binding(found.program, found.solution, phase)
+        ]
+        for experiment, phase in zip(self.experiments, found.phases.values(), strict=True):
+            limits = signal_limits(phase.phase, self.name)
+            for name, samples in experiment.measured.items():
+                for k, values in enumerate(samples.values.T):
+                    element = name if samples.values.shape[1] == 1 else f"{name}[{k}]"
+                    low, high = limits.get(f"{experiment.name}.model.{element}", (-np.inf, np.inf))
+                    beyond = np.maximum(low - values, values - high)
+                    worst = int(np.argmax(beyond))
+                    if beyond[worst] > 0:
+                        words.append(
+                            f"measured {element} of {experiment.name} lies beyond by up to {beyond[worst]:.3g}, at t = "
+                            f"{samples.times[worst]:.5g} s"
+                        )
+        return [
+            "limits that the model declares for its variables bind and pull the fit; the deviations do not know of them: "
+            + "; ".join(words)
+        ]
 
     def _computed(self) -> list[str]:
         """Message for outputs with residuals as small as those of computed data, without standard deviations."""

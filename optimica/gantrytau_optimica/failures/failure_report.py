@@ -65,8 +65,8 @@ def report(built: Built, program: Program, solution: Solution, phases: Sequence[
     if solution.status in (WORDS["Infeasible_Problem_Detected"], WORDS["Not_Enough_Degrees_Of_Freedom"]):
         lines += _list("Depending on each other:", dependent_conditions(program), 6)
     if solution.status != NOT_BEGUN:
-        binding = [line for phase in phases for line in _binding(program, solution, phase)]
-        lines += _list("At their limits:", binding + _binding_numbers(program, solution), 12)
+        reached = [line for phase in phases for line in binding(program, solution, phase)]
+        lines += _list("At their limits:", reached + _binding_numbers(program, solution), 12)
     if solution.held:
         lines.append(
             "Positions of loops rest where they are kept near the first guess: another way may be better, try starts=."
@@ -199,7 +199,7 @@ def _objective_free(program: Program) -> bool:
     return bool(np.any(~held[columns] & used))
 
 
-def _binding(program: Program, solution: Solution, trajectory: Trajectory) -> list[str]:
+def binding(program: Program, solution: Solution, trajectory: Trajectory) -> list[str]:
     """Limits of one phase that are reached, with the intervals of time."""
     found: list[str] = []
     layout = trajectory.layout

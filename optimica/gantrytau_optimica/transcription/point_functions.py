@@ -13,10 +13,13 @@ import numpy as np
 from scipy import sparse
 
 from gantrytau import ModelError
+from gantrytau.language.piecewise import may_switch
 from gantrytau_optimica.control.control_problem import ControlProblem, Course, Phase, PointValue
 from gantrytau_optimica.transcription.assemble import Term
 from gantrytau_optimica.transcription.layout import Layout, Places, Sparse, polynomials
 from gantrytau_optimica.transcription.mesh import Mesh
+
+INSIDE = 1e-9  # share of an element by which a place next to a border keeps to its own side of a jump
 
 
 def signals(phase: Phase) -> ca.SX:
@@ -55,11 +58,11 @@ class Running:
     ) -> Term:
         """`values` at places (N,) of elements; extra: symbols (c,) with values (c, N) known there."""
         problem, layout = self.places.problem, self.layout
-        share = self.ends[0] + self.left + self.place * self.width
-        time = layout.phase.start_time + share * self.horizon
         values = ca.densify(values)
         if ca.depends_on(values, problem.time):
-            values = ca.substitute(values, problem.time, time)
+            inside = INSIDE * (0.5 - self.place) if may_switch(values) else 0.0
+            share = self.ends[0] + self.left + (self.place + inside) * self.width
+            values = ca.substitute(values, problem.time, layout.phase.start_time + share * self.horizon)
         borders = layout.mesh.shares()[1] if layout.knots.size else layout.mesh.borders
         constants = [self.ends, self.place]
         known = [borders[element][None, :], borders[element + 1][None, :], place[None, :]]
@@ -85,8 +88,7 @@ class Running:
             return [], []
         start, final = _fixed_horizon(self.places, phase, wanted[0], moves=bool(mesh.moving))
         share = mesh.borders[element] + place * mesh.widths[element]
-        # a place next to a border keeps to its own side of a jump
-        inside = 1e-9 * mesh.widths[element] * (0.5 - place)
+        inside = INSIDE * mesh.widths[element] * (0.5 - place)
         times = start + (final - start) * (share + inside)
         return [c.symbol for c in wanted], [c.value(times) for c in wanted]
 

@@ -8,11 +8,13 @@ from gantrytau import (
     InitializationError,
     Model,
     ModelError,
+    Parameter,
     SolveError,
     Start,
     StructureError,
     connect,
     simulate,
+    time,
     translate,
 )
 from gantrytau.mechanics import rotational, translational
@@ -27,7 +29,7 @@ from gantrytau.mechanics.multibody import (
     World,
 )
 from gantrytau.mechanics.multibody import Fixed as Mount
-from gantrytau_models import FourBar
+from gantrytau_models import FourBar, Pendulum
 from tests.mechanisms.rows import in_a_row, row
 
 
@@ -291,3 +293,33 @@ def test_a_loop_with_more_fixed_starts_than_mobility():
     )
     with pytest.raises(StructureError, match=words):
         translate(FourBar(crank=dict(phi=Fixed(1.0)), rocker=dict(phi=Fixed(1.2))))
+
+
+class DrivenTwice(FourBar):
+    """Crank and rocker driven by equations, where mobility is 1."""
+
+    rate = Parameter(0.5, unit="rad/s")
+
+    def equations(self):
+        yield from super().equations()
+        yield self.crank.phi == self.rate * time
+        yield self.rocker.phi == 1.0 + self.rate * time
+
+
+def test_joints_driven_by_more_equations_than_mobility():
+    words = (
+        r"found 2 driven joints, crank\.phi by .*equation 16, rocker\.phi by .*, where loops leave mobility 1"
+    )
+    with pytest.raises(StructureError, match=words):
+        translate(DrivenTwice())
+
+
+def test_a_start_outside_of_reach_is_told_with_one_that_closes():
+    with pytest.raises(InitializationError, match=r"consistent near these starts: crank\.phi = ") as told:
+        translate(FourBar(1.0, dict(length=1.0, phi=Fixed(3.0)), 0.6, 0.6))
+    near = float(str(told.value).split("crank.phi = ")[1].split()[0])
+    assert 1.2 < near < 2 * np.arcsin(0.6)  # where coupler and rocker are in line
+    with pytest.raises(
+        InitializationError, match=r"Unknowns there: x, y\..*near these starts: x = 1 in place of 2"
+    ):
+        translate(Pendulum(x=Fixed(2.0), y=Fixed(0.0)))

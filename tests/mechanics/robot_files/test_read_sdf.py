@@ -195,6 +195,10 @@ PAIR = link("a") + link("b")
             link("a", '<pose relative_to="b"/>') + link("b", '<pose relative_to="a"/>'),
             "relative to itself (a, b)",
         ),
+        (
+            link("a", '<pose rotation_format="quat_xyzw">0 0 0 0 0 0 0</pose>'),
+            "link[a]/pose: found the quaternion 0 0 0 0, expected one with a direction",
+        ),
         (link("a", "<pose>1 2 3</pose>"), "link[a]/pose: found <pose>1 2 3, expected 6 finite numbers"),
         (PAIR + joint("q", "screw", "a", "b"), "joint[q]: found type 'screw', expected a kind of joint"),
         (

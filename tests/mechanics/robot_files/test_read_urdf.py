@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Model, ModelError, Result, connect, flatten, simulate, translate
+from gantrytau import (
+    DoubtfulResult,
+    InitializationError,
+    Model,
+    ModelError,
+    Result,
+    connect,
+    flatten,
+    simulate,
+    translate,
+)
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Prismatic, Revolute, World
 from gantrytau.mechanics.robot_files import read_urdf
 from gantrytau.viewing.film import film_of
@@ -294,3 +304,27 @@ def test_solids_stand_where_the_link_is(tmp_path):
     )  # 1 m along x of the link, turned by 90 degrees
     assert cylinder.R[0][:, 2] == pytest.approx(np.array([0, 1, 0]), abs=1e-9)
     assert cylinder.size[0] == pytest.approx(np.array([0.2, 0.2, 2.0]))
+
+
+def test_rounded_half_turns_are_meant_where_a_loop_would_stay_open(tmp_path):
+    """The rocker turned over and back: its angle counts the other way."""
+
+    def turned_over(angle):
+        tree = (HERE / "four_bar.urdf").read_text()
+        loops = (HERE / "four_bar.loops.toml").read_text()
+        file = tmp_path / "turned.urdf"
+        file.write_text(tree.replace('"1 0 0"/>', f'"1 0 0" rpy="{angle} 0 0"/>'))
+        loops = loops.replace("xyz = [0.6, 0, 0]", f"xyz = [0.6, 0, 0], rpy = [{angle}, 0, 0]")
+        closing = tmp_path / "turned.toml"
+        closing.write_text(loops.replace("rocker_pivot = 1.43", "rocker_pivot = -1.43"))
+        return read_urdf(file, closing)
+
+    exact = translate(turned_over(np.pi)())
+    for angle in ("3.1416", "3.1415"):
+        with pytest.warns(
+            DoubtfulResult, match="stay open with the angles of rocker_pivot, rocker_pin as they are"
+        ):
+            found = translate(turned_over(angle)())
+        assert found.start == exact.start
+    with pytest.raises(InitializationError, match="stays open"):
+        translate(turned_over("3.143")())

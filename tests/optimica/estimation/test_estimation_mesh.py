@@ -201,7 +201,9 @@ def test_a_limit_of_the_model_that_holds_the_fit_is_told():
     times = np.linspace(0.0, 3.0, 31)
     fit = estimate(Fading, {"k": 1.0}, Experiment({"y": (times, 2.0 * np.exp(-0.7 * times))}))
     assert fit.parameters["k"] == pytest.approx(np.log(4.0) / 3.0, rel=1e-7)  # y(3) = 0.5
-    assert "limits that the model declares for its variables bind and pull the fit" in repr(fit)
+    assert "declares for its variables bind and pull the fit" in repr(fit)
+    assert "experiment_1.model.y at its lower limit 0.5 at t = 3 s; measured y of experiment_1" in repr(fit)
+    assert f"beyond by up to {0.5 - 2.0 * np.exp(-2.1):.3g}, at t = 3 s" in repr(fit)
 
 
 def test_deviations_finer_than_the_default_mesh():

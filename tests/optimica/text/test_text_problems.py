@@ -128,3 +128,17 @@ def test_a_model_has_no_constraints_and_a_mo_file_no_optimization(tmp_path):
     (tmp_path / "model.mo").write_text("model M Real x(free = true); end M;")
     with pytest.raises(ModelError, match=r"found 'free', which is Optimica, expected it in a \.mop file"):
         load_optimica(tmp_path / "model.mo")["M"]
+
+
+def test_a_step_on_a_border_of_elements_counts_on_its_side_and_a_free_state_begins_anywhere(tmp_path):
+    (tmp_path / "step.mop").write_text(
+        """optimization Step(objective = x(finalTime), objectiveIntegrand = if time < 0.5 then 1 else 3,
+            startTime = 0, finalTime = 1)
+          Real x(start = 1, free = true, min = 0.2, max = 3);
+          input Real u(min = -1, max = 1);
+        equation
+          der(x) = u;
+        end Step;"""
+    )
+    found = optimize(load_optimica(tmp_path / "step.mop")["Step"], elements=4)
+    assert found.objective == pytest.approx(0.2 + 2, abs=1e-6)  # of Ipopt's relaxed limits

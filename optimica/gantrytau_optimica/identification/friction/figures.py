@@ -1,4 +1,4 @@
-"""Figures of friction: Dressler (2012), Figures 6.2 to 6.5."""
+"""Figures of friction: Dressler (2012), Figures 6.2 and 6.4."""
 
 import os
 from collections.abc import Callable, Sequence

@@ -66,7 +66,7 @@ class Friction(Record):
         return np.where(v == 0, 0.0, coulomb * np.sign(v) + viscous * v)
 
     def plot(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
-        """Forces less weight over speed for each actuator, with the law, and the weight of each run: Figures 6.2 to 6.5."""
+        """Forces less weight over speed for each actuator, with the law, and the weight of each run: Figures 6.2 and 6.4."""
         return draw_friction(self.load.actuators, self.runs, self.mass, self.force, file)
 
     def __repr__(self) -> str:

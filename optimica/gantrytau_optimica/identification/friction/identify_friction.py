@@ -36,7 +36,7 @@ def identify_friction(
     Coulomb friction as symmetric as possible, of the least sum of (f_c+ - f_c-)^2 over the actuators; "positions",
     that of the least residual over runs at several positions of the tool (three, better five), whatever friction is; or
     known in kg. asymmetric=False: one friction for both directions, which tells the mass by least residual at any position.
-    Raises ModelError for runs that are not of this robot, and for what they do not tell. Dressler (2012), section 6.1.
+    Raises ModelError for runs that are not of this robot, and for what they do not tell. Dressler (2012), section 6.2.
     """
     known = not isinstance(mass, (str, bool)) and np.ndim(mass) == 0 and np.isfinite(mass)
     if mass not in ("symmetric", "positions") if isinstance(mass, str) else not known:

@@ -1,10 +1,11 @@
 """Measured motion of a robot: actuator positions and forces over time."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -13,12 +14,16 @@ from gantrytau.border.checks import array, number, whole
 from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
 from gantrytau.kinematics.kinematics import driven_joints
+from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.calibration.devices.sampled_devices import instants
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.logs.log_checks import GAP, check_log
 from gantrytau_optimica.identification.logs.log_files import read_log, write_log
 from gantrytau_optimica.identification.logs.lost_rows import lost_rows
 from gantrytau_optimica.identification.spectra.sampled_motion import rows_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,6 +110,28 @@ class MotionLog(Record):
         """Write the log as a CSV file, in SI, which `read` reads to the last digit."""
         write_log(Path(path), dict(t=self.t, q=self.q, f=self.f, v=self.v, r=self.r))
         return Path(path)
+
+    def plot(
+        self, *, beside: "Mapping[str, MotionLog] | None" = None, file: str | os.PathLike[str] | None = None
+    ) -> "Figure":
+        """Forces of the actuators over time, with other logs by name, as of models: Dressler (2012), Figure 6.5."""
+        import matplotlib.pyplot as plt
+
+        if file is not None:
+            check_suffix(file)
+        n = self.f.shape[1]
+        figure, axes = plt.subplots(
+            n, squeeze=False, sharex=True, figsize=(8.0, 1.0 + 1.8 * n), layout="constrained"
+        )
+        for i, axis in enumerate(axes[:, 0]):
+            axis.plot(self.t, self.f[:, i], color="0.7", linewidth=0.8, label="measured")
+            for name, log in (beside or {}).items():
+                axis.plot(log.t, log.f[:, i], linewidth=1.0, label=name)
+            axis.set_ylabel(f"actuator {i + 1} [N]")
+            axis.grid(alpha=0.3)
+        axes[0, 0].legend(fontsize="small")
+        axes[-1, 0].set_xlabel("time [s]")
+        return finished(figure, file)
 
     def __len__(self) -> int:
         return len(self.t)

@@ -1,11 +1,17 @@
 """The part of a run that is learnt: windows that fade in and out."""
 
+import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.border.checks import number
+from gantrytau.results.figures import check_suffix, finished
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,19 @@ class Tukey:
         found[first : first + flank] = shape[:flank]
         found[last - flank : last] = shape[flank:]
         return found
+
+    def plot(self, samples: int, period: float, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """Weights over time: Dressler (2012), Figure 7.4. Raises ModelError as `weights` does."""
+        import matplotlib.pyplot as plt
+
+        if file is not None:
+            check_suffix(file)
+        weights = self.weights(samples, period)
+        figure, axis = plt.subplots(figsize=(6.4, 2.8), layout="constrained")
+        axis.plot(period * np.arange(samples), weights)
+        axis.set(xlabel="time [s]", ylabel="weight of corrections")
+        axis.grid(alpha=0.3)
+        return finished(figure, file)
 
     def full(self, samples: int, period: float) -> np.ndarray:
         """Where weights are one, (N,): the part by which errors are judged, (7.25)."""

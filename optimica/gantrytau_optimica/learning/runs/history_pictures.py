@@ -64,14 +64,26 @@ def _errors(history: Any) -> "Figure":
 
 
 def _over_time(title: str, history: Any, rows: list[tuple[str, list[tuple[str, np.ndarray]]]]) -> "Figure":
-    """An axis for each of rows, with lines over time in mm or mrad; what is applied in full is shaded."""
+    return draw_over_time(title, history.reference.t, history.full, rows)
+
+
+def draw_over_time(
+    title: str,
+    t: np.ndarray,
+    full: np.ndarray,
+    rows: list[tuple[str, list[tuple[str, np.ndarray]]]],
+    file: str | os.PathLike[str] | None = None,
+) -> "Figure":
+    """An axis for each of rows, with lines over t (N,) in mm or mrad; samples `full` (N,), applied in full, are shaded."""
     import matplotlib.pyplot as plt
+
+    if file is not None:
+        check_suffix(file)
 
     figure, axes = plt.subplots(
         len(rows), 1, figsize=(7.0, 1.9 * len(rows) + 0.6), layout="constrained", sharex=True, squeeze=False
     )
-    t = history.reference.t
-    within = t[history.full]
+    within = t[full]
     for axis, (name, lines) in zip(axes[:, 0], rows, strict=True):
         axis.axvspan(within[0], within[-1], color="0.94", label="judged")
         for label, values in lines:
@@ -80,7 +92,7 @@ def _over_time(title: str, history: Any, rows: list[tuple[str, list[tuple[str, n
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside right upper")
     axes[0, 0].set_title(title)
     axes[-1, 0].set_xlabel("time [s]")
-    return figure
+    return finished(figure, file)
 
 
 def _ends(history: Any) -> list[int]:

@@ -1,6 +1,8 @@
 """How well a robot repeats a motion: what no learning can take away."""
 
+import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,18 +18,22 @@ from gantrytau_optimica.learning.runs.robot_runs import Plant
 from gantrytau_optimica.learning.runs.run_checks import check_runs
 from gantrytau_optimica.learning.servo_loop import unit_of
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True, eq=False)
 class Repetitions(Record):
     """Runs of one motion. q: measured positions of the joints (K, N, n); error: reference less these in run 0, (N, n).
 
-    full: the samples (N,) by which they are judged.
+    t: times (N,) in s; full: the samples (N,) by which they are judged.
     """
 
     joints: tuple[str, ...]
     q: np.ndarray
     error: np.ndarray
     full: np.ndarray
+    t: np.ndarray
 
     @property
     def deviations(self) -> np.ndarray:
@@ -43,6 +49,17 @@ class Repetitions(Record):
     def relative(self) -> np.ndarray:
         """These in % of the error, (n,)."""
         return 100 * self.rms / np.sqrt(np.mean(self.error[self.full] ** 2, axis=0))
+
+    def plot(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """Errors of the joints in run 0 and deviations of the other runs from it: Dressler (2012), Figures 7.6 and 7.12."""
+        from gantrytau_optimica.learning.runs.history_pictures import draw_over_time
+
+        later = [(f"run 0 less run {k}", one) for k, one in enumerate(self.deviations, 1)]
+        rows = [
+            (name, [("error of run 0", self.error[:, i]), *((label, one[:, i]) for label, one in later)])
+            for i, name in enumerate(self.joints)
+        ]
+        return draw_over_time("repeated runs", self.t, self.full, rows, file)
 
     def __str__(self) -> str:
         rows = [f"repeated {len(self.q)} times, deviations from the first"]
@@ -76,7 +93,7 @@ def repeat(
     q_ref, v_ref = at.references(reference.r, u, rig.period)
     q = np.array([_measured(rig, q_ref, v_ref, RUNS * seed, k) for k in range(runs)])
     weights = (window or Tukey(lead=0.0)).full(len(reference), reference.period)
-    return Repetitions(rig.kinematics.joints, q, q_r - q[0], weights)
+    return Repetitions(rig.kinematics.joints, q, q_r - q[0], weights, reference.t)
 
 
 def _measured(rig: Plant, q_ref: np.ndarray, v_ref: np.ndarray, seed: int, k: int) -> np.ndarray:

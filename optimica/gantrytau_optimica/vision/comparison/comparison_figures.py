@@ -1,20 +1,27 @@
-"""Pictures of how measured places miss a reference, as Figures 5.12 to 5.19 of the thesis."""
+"""Pictures of how measured places miss a reference, as Figures 5.14, 5.15 and 5.17 to 5.19 of the thesis."""
 
 import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gantrytau.results.figures import check_suffix, finished
 from gantrytau_optimica.vision.comparison.compare import Comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ARROW = 0.08  # of the extent of the places: the largest arrow
 MARGIN = 0.12  # of the extent, for arrows at the border
 AXES = "xyz"
 
 
-def plot_comparison(comparison: Comparison, *, file: str | os.PathLike[str]) -> None:
-    """Figures 5.12 to 5.19: a map in two views with errors as arrows, enlarged, and histograms of amounts and by axis."""
+def plot_comparison(comparison: Comparison, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+    """Figures 5.14, 5.15, 5.17 to 5.19: a map in two views with enlarged error arrows, histograms of amounts and by axis."""
     from matplotlib.figure import Figure
 
+    if file is not None:
+        check_suffix(file)
     known = np.isfinite(comparison.distances)
     places, error = comparison.reference[known], 1e3 * comparison.error[known]
     amounts = 1e3 * comparison.distances[known]
@@ -43,4 +50,4 @@ def plot_comparison(comparison: Comparison, *, file: str | os.PathLike[str]) -> 
     for k, name in enumerate("def"):
         shown[name].hist(error[:, k], bins=bins, color="tab:orange")
         shown[name].set_xlabel(f"along {AXES[k]} [mm]")
-    figure.savefig(file, dpi=120)
+    return finished(figure, file)

@@ -1,0 +1,135 @@
+"""Conditions of `when` as they stand in a text, and what is asked for before an instant."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from gantrytau.modelica import tree
+from gantrytau.modelica.references import dotted, nodes_of, references
+
+BEFORE = frozenset({"pre", "edge", "change"})
+Items = Sequence[tree.EquationOrStatement]
+AT_START = "initial"  # a keyword, which no component has as its name
+BEHIND, TURN = (
+    "before_",
+    "turn_",
+)  # and a variable: its value before an instant, and the parity of its changes
+
+
+def is_call(e: tree.Expression, name: str) -> bool:
+    """Whether an expression calls a function of that name."""
+    return isinstance(e, tree.Call) and e.function.parts[0][0] == name
+
+
+def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
+    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
+    conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
+    return tuple(instant_and_rest(one)[0] for one in conditions)
+
+
+def instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
+    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
+    if isinstance(test, tree.Binary) and test.operator == "and":
+        for one, other in ((test.left, test.right), (test.right, test.left)):
+            if is_call(one, "sample") or is_call(one, "edge"):
+                return one, other
+    return test, None
+
+
+def guarded_samples(whens: Iterable[tree.Branching]) -> Iterator[tree.Call]:
+    """The calls of `sample` beside another condition, by `and`, in a `when` with `elsewhen`."""
+    for item in whens:
+        pairs = [instant_and_rest(test) for test, _ in item.branches] if len(item.branches) > 1 else []
+        for instant, rest in pairs:
+            if rest is not None and isinstance(instant, tree.Call) and is_call(instant, "sample"):
+                yield instant
+
+
+def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
+    """The calls of `sample` in a condition of `when`."""
+    left = [test]
+    for one in left:
+        if isinstance(one, tree.Call) and is_call(one, "sample") and len(one.arguments) == 2:
+            yield one
+        elif isinstance(one, tree.ArrayConstructor):
+            left += one.items
+        elif isinstance(one, tree.Binary):
+            left += [one.left, one.right]
+
+
+def calls_before(e: Any) -> Iterator[tree.Call]:
+    """Calls of `pre`, `edge` and `change` of variables without subscripts."""
+    for one in nodes_of(e):
+        if (
+            isinstance(one, tree.Call)
+            and one.function.parts[0][0] in BEFORE
+            and one.arguments
+            and dotted(one.arguments[0])
+        ):
+            yield one
+
+
+def targets(items: Items) -> Iterator[str]:
+    """Names of the variables that statements, or the equations in a `when`, set."""
+    for item in items:
+        if isinstance(item, (tree.ForLoop, tree.WhileLoop)):
+            yield from targets(item.items)
+        elif isinstance(item, tree.Branching):
+            for _, inner in (*item.branches, (None, item.otherwise or ())):
+                yield from targets(inner)
+        left = item.left if isinstance(item, tree.SimpleEquation) else None
+        several = left.items if isinstance(left, tree.OutputList) else (left,)
+        for each in item.targets if isinstance(item, tree.Assignment) else several:
+            if isinstance(each, tree.ComponentReference):
+                yield each.parts[0][0]
+
+
+def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
+    """Calls of `assert`, and of `terminate` under a further condition, in a `when`."""
+    for item in items:
+        if isinstance(item, tree.Branching):
+            for _, inner in (*item.branches, (None, item.otherwise or ())):
+                yield from checks_in(inner, True)
+        elif isinstance(item, tree.ProcedureCall) and (
+            is_call(item.call, "assert") or (inside and is_call(item.call, "terminate"))
+        ):
+            yield item.call
+
+
+def changed_in(test: tree.Expression, items: Items) -> Iterator[str]:
+    """Names of variables whose changes are a condition, by `edge` or `change`, or as b beside pre(b)."""
+    own = set(targets(items))
+    calls = [one for one in calls_before(test) if dotted(one.arguments[0]) not in own]
+    inside = {id(one.arguments[0]) for one in calls}
+    bare = [one for one in references(test) if id(one) not in inside]
+    yield from (
+        dotted(one.arguments[0]) for one in calls if not is_call(one, "pre") or one.arguments[0] in bare
+    )
+
+
+def first_valued(item: tree.EquationOrStatement) -> str:
+    """The name in an initial equation `pre(name) = value` or `name = value`; "" for another one."""
+    left: Any = item.left if isinstance(item, tree.SimpleEquation) else None
+    if isinstance(left, tree.Call) and is_call(left, "pre"):
+        (left,) = left.arguments
+    return left.parts[0][0] if isinstance(left, tree.ComponentReference) and len(left.parts) == 1 else ""
+
+
+def gives_value_before(item: tree.EquationOrStatement) -> bool:
+    """Whether it is an initial equation of `pre(x)`, which says nothing of an x that nothing asks for before an instant."""
+    return (
+        isinstance(item, tree.SimpleEquation)
+        and isinstance(item.left, tree.Call)
+        and is_call(item.left, "pre")
+    )
+
+
+def followed_name(kind: str, name: str) -> str:
+    """The name of a Discrete that follows a variable."""
+    return kind + name.replace(".", "_")
+
+
+def sample_name(call: tree.Expression) -> str:
+    """The name of the Discrete of a call: the next instant of `sample`, whether it is the start, whether the run ends."""
+    assert isinstance(call, tree.Call)
+    kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
+    return f"{kind}_{call.at}" if call.arguments else AT_START

@@ -1,0 +1,1 @@
+"""External functions of the Modelica Standard Library, on functions of our own."""

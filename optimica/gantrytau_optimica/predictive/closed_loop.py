@@ -1,0 +1,111 @@
+"""The loop of a predictive controller and a plant with other parameters, measured with noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gantrytau import ModelError, Result
+from gantrytau.border.checks import number
+from gantrytau.border.refusal import Given
+from gantrytau.describing.record import Record
+from gantrytau_optimica.predictive.stages import Stages
+
+if TYPE_CHECKING:
+    from gantrytau_optimica.predictive.mpc import Mpc
+    from gantrytau_optimica.predictive.plan import Timing
+
+PARTS = 4  # steps of the plant in a period
+
+
+@dataclass(frozen=True, eq=False)
+class Loop(Record):
+    """A closed loop, looked up by the model's names as its `result`: `loop["crane.s"]`, (times,).
+
+    result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
+    its steps; cost: the integral of the problem's integrand along the motion.
+    """
+
+    result: Result
+    statuses: tuple[str, ...]
+    timing: "Timing"
+    cost: float
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.result[name]
+
+    @property
+    def time(self) -> np.ndarray:
+        """The samples in s."""
+        return self.result.time
+
+    def plot(self, *names: str, **keywords: Any):
+        """Variables over time, as Result.plot."""
+        return self.result.plot(*names, **keywords)
+
+    def __str__(self) -> str:
+        words = {status: self.statuses.count(status) for status in dict.fromkeys(self.statuses)}
+        said = ", ".join(f"{count} {status}" for status, count in words.items())
+        return f"{self.result.title}: {self.result.time[-1]:g} s, cost {self.cost:.6g}; {said}\n{self.timing}"
+
+
+def closed_loop(
+    mpc: "Mpc",
+    plant: "tuple[Any, Stages]",
+    stop: float,
+    start: Mapping[str, Any],
+    noise: Mapping[str, float],
+    seed: int,
+) -> Loop:
+    """Controller and plant from start to stop; the plant moves exactly between samples, to the order of its steps."""
+    built, stages = plant
+    if (
+        tuple(s.name for s in stages.phase.states) != mpc.states
+        or tuple(s.name for s in stages.phase.inputs) != mpc.inputs
+    ):
+        raise ModelError(
+            f"plant has the states {', '.join(s.name for s in stages.phase.states)}, expected those of the controller, "
+            f"{', '.join(mpc.states)}: give the same problem with other parameters",
+            place=mpc.name,
+        )
+    count = round(number("run", "stop", stop, unit="s", above=0.0) / mpc.period)
+    if count < 1:
+        raise ModelError(
+            f"expected at least one period of {mpc.period:g} s", place="run", found=Given("stop", stop)
+        )
+    spread = np.zeros(stages.nx)
+    for name, value in noise.items():
+        if name not in mpc.states:
+            raise ModelError(
+                f"expected states of {', '.join(mpc.states)}", place="run", found=Given("noise", name)
+            )
+        spread[mpc.states.index(name)] = number("run", f"noise[{name}]", value, least=0.0)
+    random = np.random.default_rng(seed)
+    guessed = [s.guess(np.zeros(1))[0] for s in (*stages.phase.states, *stages.phase.algebraics)]
+    each = stages.nx + stages.nz
+    w = np.tile(np.array(guessed, dtype=float) / stages.size_w[:each], 2)
+    x = mpc.scaled_state(dict(zip(mpc.states, guessed, strict=False)) | dict(start))
+    w[: stages.nx] = w[stages.last] = x
+    states, unknowns, inputs, statuses, cost = [x], [], [], [], 0.0
+    waiting = mpc.held
+    for k in range(count):
+        t = k * mpc.period
+        measured = x * stages.sizes_x + spread * random.standard_normal(stages.nx)
+        given = mpc.step(dict(zip(mpc.states, measured.tolist(), strict=True)), t)
+        statuses.append(mpc.status)
+        mpc.prepare()
+        u = np.array(list(given.values())) / stages.sizes_u
+        u, waiting = (waiting, u) if mpc.delay else (u, u)
+        for part in range(PARTS):
+            at = t + part * stages.step
+            w = stages.moved(x, w, u, at)
+            cost += stages.spent(w, u, at)
+            x = w[stages.last]
+        states.append(x)
+        unknowns.append(w)
+        inputs.append(u)
+    found = mpc.result(
+        0.0, np.array(states), np.array(unknowns), np.array(inputs), f"{mpc.name}, closed loop", built
+    )
+    return Loop(found, tuple(statuses), mpc.timing, cost)

@@ -1,0 +1,320 @@
+"""`Mpc`: an optimal-control problem solved anew at every sample, over a horizon that recedes."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import ModelError, Result
+from gantrytau.border.checks import array, number, one_of, whole
+from gantrytau.border.refusal import Given, did_you_mean
+from gantrytau.simulation.to_result import labels
+from gantrytau_optimica.answers.answer import Answer
+from gantrytau_optimica.control.build import build
+from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.predictive.closed_loop import PARTS, Loop, closed_loop
+from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.plan import Timing, Trajectory, first_plan, guessed_plan
+from gantrytau_optimica.predictive.stages import Linear, Stages
+from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
+from gantrytau_optimica.problem.optimization import Optimization
+from gantrytau_optimica.problem.read_problem import read_problem
+
+Status = Literal["solved", "not converged", "late", "lost", "failed"]
+STANDS = 1e-9  # changes of scaled variables by which iterations are done
+PENALTY = 1e3  # times the largest curvature of the objective
+MOST = 50  # iterations of the first plan, and of `converged`
+
+
+class Mpc:
+    """Model predictive control by a problem's objective and constraints, over a horizon of `elements` periods.
+
+    problem: a subclass of Optimization or an instance, with a fixed end time, which the horizon replaces, and no events.
+    period: s, between two samples, over which inputs are held; elements: periods of the horizon.
+    hard: words of limits along the path that are never softened, "all", or "none" (the default). Limits of inputs are always
+    hard; soft ones give way, by an exact penalty, where no plan keeps them.
+    penalty: of the objective for passing a limit by its size; default: 1e3 times the largest curvature of the objective.
+    terminal: "lqr" adds the cost of holding the state at rest that costs least for ever (Riccati), None adds nothing but
+    the problem's own objective at its end.
+    iterations: of Gauss-Newton's method at a step: 1 is real-time iteration (Diehl, Bock, Schloeder, 2005); "converged":
+    until nothing changes. delay: periods from a measurement until its inputs are applied, 0 or 1; the state is foretold to
+    then.
+    deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
+    guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
+    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
+    """
+
+    def __init__(
+        self,
+        problem: Optimization | type[Optimization],
+        *,
+        period: float,
+        elements: int = 20,
+        hard: str | Sequence[str] = "none",
+        penalty: float | None = None,
+        terminal: Literal["lqr"] | None = None,
+        iterations: int | Literal["converged"] = 1,
+        delay: int = 0,
+        deadline: float | None = None,
+        guess: Mapping[str, Any] | Result | Answer | None = None,
+    ):
+        self.period = number("Mpc", "period", period, unit="s", above=0.0)
+        self.elements = whole("Mpc", "elements", elements, least=1)
+        self.delay = whole("Mpc", "delay", delay, least=0, most=1)
+        self.deadline = number(
+            "Mpc", "deadline", math.inf if deadline is None else deadline, unit="s", above=0.0, most=math.inf
+        )
+        self._converged = iterations == "converged"
+        self.iterations = whole("Mpc", "iterations", MOST if self._converged else iterations, least=1)
+        if terminal is not None:
+            one_of("Mpc", "terminal", terminal, ("lqr",))
+        if penalty is not None:
+            penalty = number("Mpc", "penalty", penalty, above=0.0)
+        self.built, self._stages = _staged(problem, self.period)
+        self.name = self.built.read.name
+        soft = self._soft(hard)
+        weight = PENALTY * self._stages.curvature if penalty is None else penalty
+        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, weight)
+        self._terminal = Terminal(self._stages, self.elements * self.period)
+        self._steady = SteadyState(self._stages) if terminal == "lqr" else None
+        self._guess = guess
+        self._plan: Trajectory | None = None
+        self._prepared: tuple[float, Linear] | None = None
+        self._preparations: list[float] = []
+        self._steps: list[float] = []
+        self._missed = 0
+        self.status: Status | None = None
+        self.softened: tuple[str, ...] = ()  # limits that the last plan passes
+        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+
+    def __repr__(self) -> str:
+        counts = f"{self._stages.nx} states, {self._stages.nu} inputs"
+        return f"<Mpc {self.name}: {self.elements} periods of {self.period:g} s, {counts}>"
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states, all of which `step` wants."""
+        return tuple(s.name for s in self._stages.phase.states)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs that `step` gives."""
+        return tuple(s.name for s in self._stages.phase.inputs)
+
+    @property
+    def timing(self) -> Timing:
+        """What all steps took until now."""
+        return Timing(tuple(self._preparations), tuple(self._steps), self._missed)
+
+    @property
+    def plan(self) -> Result:
+        """All variables of the model over the horizon as planned at the last step, inputs as they are held."""
+        if self._plan is None:
+            raise ModelError("there is no plan before the first step", place=self.name)
+        return self.result(self._plan.t, self._plan.x, self._plan.w, self._plan.u, f"{self.name}, planned")
+
+    def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
+        """The inputs to hold from now on, with delay=1 from the next sample on, by name.
+
+        measured: the state by names, at time t in s. What is not finite is taken as the plan foretold it, and `.status` says
+        "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        """
+        begin = time.perf_counter()
+        x, lost = self._state(measured)
+        if self.delay:
+            x, t = self._later(x, t), t + self.period
+        before = self._plan
+        plan, solved, change = self._iterated(x, t)
+        late = before is not None and time.perf_counter() - begin > self.deadline
+        kept = plan if before is None else before.shifted(t, self.period)
+        self._plan = plan if solved else None if before is None else kept
+        held = kept.u[0] if late or not solved else plan.u[0]
+        self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
+        self._missed += late
+        wanting = self._converged and change >= STANDS
+        words: dict[Status, bool] = {
+            "failed": not solved,
+            "late": late,
+            "lost": lost,
+            "not converged": wanting,
+            "solved": True,
+        }
+        self.status = next(word for word, holds in words.items() if holds)
+        self._steps.append(time.perf_counter() - begin)
+        return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
+
+    def _iterated(self, x: np.ndarray, t: float) -> tuple[Trajectory, bool, float]:
+        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
+        first, change = self._plan is None, math.inf
+        plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
+        prepared, self._prepared = self._prepared, None
+        for k in range(MOST if first else self.iterations):
+            if k == 0 and prepared is not None and abs(prepared[0] - t) < 1e-9 * self.period:
+                linear = prepared[1]
+            else:
+                linear = self._linear(plan)
+            found = self._solved(plan, linear, x)
+            if not found.solved:
+                return plan, False, change
+            plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
+            self.softened = self._passed(found)
+            if change < STANDS:
+                break
+        return plan, True, change
+
+    def prepare(self) -> None:
+        """What can be done before the next measurement: the plan shifted by a period, and linearised."""
+        begin = time.perf_counter()
+        if self._plan is not None:
+            plan = self._plan.shifted(self._plan.t + self.period, self.period)
+            self._prepared = plan.t, self._linear(plan)
+        self._preparations.append(time.perf_counter() - begin)
+
+    def _linear(self, plan: Trajectory) -> Linear:
+        times = plan.t + self.period * np.arange(self.elements)
+        return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
+
+    def reset(self) -> None:
+        """Forget the plan: the next step makes a first one."""
+        self._plan = self._prepared = None
+        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+
+    def result(
+        self, t: float, x: np.ndarray, w: np.ndarray, u: np.ndarray, title: str, of: Any = None
+    ) -> Result:
+        """All variables of the model over stages from t on; x (N + 1, nx), w (N, nw), u (N, nu), scaled."""
+        stages, built = self._stages, of or self.built
+        names = list(built.read.dae.variables)
+        each = stages.nx + stages.nz
+        last = w[:, each:] * stages.size_w[:each]
+        z = np.vstack([w[:1, stages.nx : each] * stages.sizes_z, last[:, stages.nx :]])
+        signals = np.hstack([x * stages.sizes_x, z, np.vstack([u, u[-1:]]) * stages.sizes_u])
+        times = t + self.period * np.arange(len(x))
+        courses = [course.value(times) for course in stages.phase.courses]
+        (phase,) = built.problem.phases
+        own = [ca.vertcat(*(s.symbol for s in phase.signals)), built.problem.time]
+        own.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
+        named = ca.Function("variables", own, [ca.densify(built.expressed(names))])
+        values = np.asarray(
+            named(signals.T, times[None, :], np.array(courses).reshape(len(courses), times.size))
+        )
+        units, words = labels(built.read.dae)
+        own: Any = dict(units=units, descriptions=words, title=title, held=self.inputs)
+        return Result(times, dict(zip(names, values, strict=True)), **own)
+
+    def run(
+        self,
+        plant: Optimization | type[Optimization] | None = None,
+        *,
+        stop: float,
+        start: Mapping[str, Any] | None = None,
+        noise: Mapping[str, float] | None = None,
+        seed: int = 0,
+    ) -> Loop:
+        """The loop closed with a plant, from a new plan on.
+
+        plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
+        the model's start; noise: state -> standard deviation of its measurement, in its unit.
+        """
+        self.reset()
+        self._preparations, self._steps, self._missed = [], [], 0
+        step = self.period / PARTS
+        other = _staged(plant, step) if plant is not None else (self.built, Stages(self.built.problem, step))
+        return closed_loop(self, other, stop, start or {}, noise or {}, seed)
+
+    @property
+    def held(self) -> np.ndarray:
+        """The inputs that are applied now, scaled."""
+        return self._applied
+
+    def scaled_state(self, values: Mapping[str, Any]) -> np.ndarray:
+        """A whole state by names, scaled; errors of `step`."""
+        return self._state(values)[0]
+
+    def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
+        """The measured state, scaled, and whether a part of it was not finite."""
+        flat, found = self.built.read.dae.flat, {}
+        for name, value in measured.items():
+            elements = flat.expand(name)
+            unknown = [one for one in elements if one not in self.states]
+            if unknown:
+                words = f"expected the states {', '.join(self.states)}{did_you_mean(unknown[0], self.states)}"
+                raise ModelError(words, place=self.name, found=Given("measured", name))
+            shape = (len(elements),) if len(elements) > 1 else ()
+            values = array(self.name, name, value, shape, finite=False)
+            found.update(zip(elements, np.ravel(values), strict=True))
+        missing = [name for name in self.states if name not in found]
+        if missing:
+            words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
+            raise ModelError(words, place=self.name)
+        x = np.array([found[name] for name in self.states], dtype=float) / self._stages.sizes_x
+        lost = not np.isfinite(x).all()
+        if lost:
+            if self._plan is None:
+                raise ModelError("the first measurement is not finite, expected numbers", place=self.name)
+            foretold = self._plan.x[0 if self.delay else 1]
+            x = np.where(np.isfinite(x), x, foretold)
+        return x, lost
+
+    def _later(self, x: np.ndarray, t: float) -> np.ndarray:
+        """The state a period later with the inputs held that are applied now."""
+        plan = self._first(x, t) if self._plan is None else self._plan
+        return self._stages.moved(x, plan.w[0], self._applied, t)[self._stages.last]
+
+    def _first(self, x: np.ndarray, t: float) -> Trajectory:
+        """A plan to begin with: at rest, or the guess."""
+        plan = first_plan(self._stages, self.elements, x, t)
+        return plan if self._guess is None else guessed_plan(self._stages, plan, self._guess)
+
+    def _solved(self, plan: Trajectory, linear: Linear, x: np.ndarray) -> Found:
+        stages = self._stages
+        lower, upper = stages.rows
+        H, g = self._terminal.added(linear, plan)
+        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
+        if self._steady is not None:
+            P, rest = self._steady.at(plan.t + self.elements * self.period, plan.x[-1])
+            p = P @ (plan.x[-1] - rest)
+        stage = Stage(
+            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
+            stages.lower_u - plan.u, stages.upper_u - plan.u,
+        )  # fmt: skip
+        return self._program.solve(stage, P, p, x - plan.x[0])
+
+    def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
+        """Which rows of a stage are soft."""
+        names = self._stages.row_names
+        if isinstance(hard, str):
+            one_of("Mpc", "hard", hard, ("none", "all"))
+            return np.full(len(names), hard == "none")
+        unknown = [name for name in hard if name not in names]
+        if unknown:
+            words = f"expected some of {', '.join(dict.fromkeys(names)) or 'no limit'}{did_you_mean(unknown[0], names)}"
+            raise ModelError(words, place=self.name, found=Given("hard", unknown[0]))
+        return np.array([name not in hard for name in names], dtype=bool)
+
+    def _passed(self, found: Found) -> tuple[str, ...]:
+        """Words of the soft limits, where the plan passes one."""
+        passed = zip(self._stages.row_names, self._program.soft & np.any(found.slack > 1e-6), strict=True)
+        return tuple(dict.fromkeys(name for name, so in passed if so))
+
+
+def _staged(problem: Any, period: float) -> tuple[Any, Stages]:
+    """The problem in states, algebraics and inputs, and its stages; ModelError for what no receding horizon can have."""
+    read = read_problem(problem)
+    built = build(read, {}, (), {}, "forward")
+    found: ControlProblem = built.problem
+    if len(found.phases) > 1:
+        raise ModelError("phases are not for a receding horizon, expected one problem", place=read.name)
+    if found.free:
+        names = ", ".join(n.name for n in found.free)
+        raise ModelError(
+            f"{names} is free, expected a number: a receding horizon has a fixed length and a fixed model; give it a value, "
+            "as in final_time = 1.0",
+            place=read.name,
+        )
+    if not any(phase.inputs for phase in found.phases):
+        raise ModelError("there is no input to choose; declare one as Input", place=read.name)
+    return built, Stages(found, period)

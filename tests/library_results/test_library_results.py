@@ -1,0 +1,144 @@
+"""The tube around closed-form trajectories, and a small library of our own beside results that are written here."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.library_results.example import LEFT, NO_REFERENCE, PASSED, REFUSED, outcome_of
+from tests.library_results.references import references
+from tests.library_results.summary import write_summary
+from tests.library_results.tube import leaves
+
+TIME = np.linspace(0, 10, 501)
+OWN = """package Own
+  model Decay
+    Real x(start = 1, fixed = true);
+  equation
+    der(x) = -x;
+  end Decay;
+  model Partly
+    Missing m;
+  end Partly;
+  annotation(version = "4.1.0");
+end Own;
+"""
+
+
+def _edge(at):
+    """A unit step as an integrator gives it: both sides at one time."""
+    time = np.sort(np.append(TIME, [at, at]))
+    values = (time > at).astype(float)
+    values[np.searchsorted(time, at) + 1] = 1.0
+    return time, values
+
+
+@pytest.mark.parametrize(("share", "inside"), [(0.0019, True), (0.0021, False)])
+def test_the_tube_is_as_high_as_a_share_of_the_range(share, inside):
+    hat = 1 - np.abs(TIME - 5) / 5  # at its top the width of the tube adds nothing
+    assert (leaves(TIME, hat, TIME, hat + share) is None) is inside
+
+
+@pytest.mark.parametrize(("shift", "inside"), [(0.019, True), (0.021, False)])
+def test_the_tube_is_as_wide_as_a_share_of_the_time(shift, inside):
+    when = leaves(*_edge(4.0), *_edge(4.0 + shift))
+    assert (when is None) is inside
+    assert when is None or 4.0 < when < 4.03
+
+
+def test_a_pulse_without_width_may_be_outside_and_one_with_it_not():
+    for wide, inside in ((1e-7, True), (0.05, False)):
+        time = np.sort(np.append(TIME, [4.001, 4.001, 4.001 + wide, 4.001 + wide]))
+        pulse = ((time >= 4.001) & (time <= 4.001 + wide)).astype(float)
+        pulse[[np.flatnonzero(pulse)[0], np.flatnonzero(pulse)[-1]]] = 0.0
+        assert (leaves(TIME, 0 * TIME, time, pulse) is None) is inside
+
+
+def test_constants_may_differ_by_noise_alone():
+    assert leaves(TIME, 0 * TIME, TIME, 0 * TIME + 1e-9) is None
+    assert leaves(TIME, 0 * TIME + 5, TIME, 0 * TIME + 5.001) == 0.0
+
+
+def test_a_run_that_ends_early_leaves_where_it_ends():
+    assert leaves(TIME[:251], TIME[:251], TIME, TIME) == pytest.approx(5.0 + 0.02, abs=0.041)
+
+
+@pytest.fixture
+def places(tmp_path):
+    """A library in a file, and results of three examples: right, wrong, and without trajectories."""
+    library, results = tmp_path / "libraries", tmp_path / "results"
+    (library / "Own").mkdir(parents=True)
+    (library / "Own" / "package.mo").write_text(OWN)
+    for name in ("Decay", "Partly", "Gone", "Large"):
+        folder = results / "Own" / name
+        folder.mkdir(parents=True)
+        (folder / "comparisonSignals.txt").write_text("time\nx\n")
+        (folder / "creation.txt").write_text(
+            "StartTime=0\nStopTime=10 // s\nInterval=0.02\nTolerance=1e-06\n"
+        )
+        rows = "".join(f"{t},{x}\n" for t, x in zip(TIME, np.exp(-TIME), strict=True))
+        (folder / f"{name}.csv").write_text('"Time","x"\n' + rows)
+    (results / "Own" / "Large" / "Large.csv").write_text("version https://git-lfs.github.com/spec/v1\n")
+    return library, results
+
+
+def test_examples_are_passed_refused_or_without_a_reference(places, tmp_path):
+    library, results = places
+    found = {one: outcome_of(one, library) for one in references(results)}
+    words = {one.name: what.word for one, what in found.items()}
+    assert words == {
+        "Own.Decay": PASSED,
+        "Own.Gone": REFUSED,
+        "Own.Large": NO_REFERENCE,
+        "Own.Partly": REFUSED,
+    }
+    assert "Missing" in next(what.detail for one, what in found.items() if one.name == "Own.Partly")
+    write_summary(found, {"Own": "4.1.0"}, "digest", tmp_path / "kept.toml")
+    write_summary({}, {}, "", tmp_path / "kept.toml")
+    assert (tmp_path / "kept.toml").read_text().count("word =") == 4
+
+
+def test_a_wrong_trajectory_is_told_with_signal_and_time(places):
+    library, results = places
+    path = results / "Own" / "Decay" / "Decay.csv"
+    rows = "".join(f"{t},{np.exp(-t) + 0.01 * (t > 3)}\n" for t in TIME)
+    path.write_text('"time","x"\n' + rows)
+    (one,) = references(results, "Own.Decay")
+    found = outcome_of(one, library)
+    assert found.word == LEFT
+    assert found.detail == "x at 3.02 s (1 of 1 signals)"
+
+
+def test_a_missing_folder_is_told_by_the_name_of_its_variable(places):
+    library, results = places
+    both = {"MODELICAPATH": str(library), "REFERENCE_RESULTS": str(results)}
+    for name in both:
+        given = {**os.environ, **both, name: ""}
+        done = subprocess.run(
+            [sys.executable, "-m", "tests.library_results"],
+            capture_output=True,
+            text=True,
+            env=given,
+            cwd=Path(__file__).parents[2],
+        )
+        assert done.returncode == 1
+        assert f"{name} is not set" in done.stderr
+
+
+def test_an_example_in_a_process_of_its_own_prints_its_outcome(places):
+    library, results = places
+    command = [
+        sys.executable,
+        "-m",
+        "tests.library_results.example",
+        "Own.Decay",
+        str(library),
+        str(results),
+        "60",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
+    assert json.loads(done.stdout)["word"] == PASSED
