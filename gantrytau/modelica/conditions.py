@@ -133,3 +133,35 @@ def sample_name(call: tree.Expression) -> str:
     assert isinstance(call, tree.Call)
     kind = "next_sample" if call.function.parts[0][0] == "sample" else "ends"
     return f"{kind}_{call.at}" if call.arguments else AT_START
+
+
+def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
+    """A name, and those that it equals by equations `a = b` up to the first `b = pre(c)`; without one the name alone."""
+    equal: dict[str, tuple[str, bool]] = {}
+    for item in (item for section in sections if section.kind == "equation" for item in section.items):
+        if isinstance(item, tree.SimpleEquation) and dotted(item.left):
+            right: Any = item.right
+            before = is_call(right, "pre")
+            if other := dotted(right.arguments[0] if before else right):
+                equal[dotted(item.left)] = other, before
+    found, before = [name], False
+    while found[-1] in equal and not before:
+        other, before = equal[found[-1]]
+        if other in found:
+            return [name]
+        found.append(other)
+    return found if before else [name]
+
+
+def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:
+    """Equations, those of samples as a `when` that sets the Boolean at each instant and takes it back there."""
+    for item in items:
+        if not isinstance(item, tree.SimpleEquation) or not is_call(item.right, "sample"):
+            yield item
+            continue
+        at, name = item.at, item.left
+        on, off = (
+            tree.SimpleEquation(at, None, None, "=", name, tree.BooleanLiteral(at, true))
+            for true in (True, False)
+        )
+        yield tree.Branching(at, None, None, "when", ((item.right, (on,)), (name, (off,))), None)

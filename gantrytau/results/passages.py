@@ -11,7 +11,7 @@ HALVINGS = 40  # of the time between two rows
 
 
 @dataclass(frozen=True)
-class Passage:
+class PassedLimit:
     """A limit, "min" or "max", that a variable passes; time: first passing, s; worst: the value farthest beyond it."""
 
     name: str
@@ -26,7 +26,7 @@ class Passage:
         return abs(self.worst - self.limit)
 
 
-def passages(result: Series) -> list[Passage]:
+def passages(result: Series) -> list[PassedLimit]:
     """The limits that the variables of a result pass, by time."""
     found = []
     for name, ends in result.limits.items():
@@ -39,7 +39,7 @@ def passages(result: Series) -> list[Passage]:
             rows = np.flatnonzero(beyond > PASSED * size) if np.isfinite(limit) else beyond[:0]
             if rows.size:
                 when = _when(result, name, limit, int(rows[0]))
-                found.append(Passage(name, side, limit, when, float(values[np.argmax(beyond)])))
+                found.append(PassedLimit(name, side, limit, when, float(values[np.argmax(beyond)])))
     return sorted(found, key=lambda one: (one.time, one.name))
 
 

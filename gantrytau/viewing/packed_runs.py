@@ -11,7 +11,7 @@ import numpy as np
 
 from gantrytau.border.refusal import Given, ModelError, did_you_mean
 from gantrytau.results.display_units import DECLARED, Display, Shown, shown_units
-from gantrytau.results.passages import Passage, passages
+from gantrytau.results.passages import PassedLimit, passages
 from gantrytau.results.series import Series
 
 LARGEST = 5e7  # numbers of a page
@@ -165,7 +165,7 @@ def _told(run: Series, name: str, shown: Shown, runs: int) -> dict[str, Any]:
     return said
 
 
-def _beyond(found: Passage, shown: Shown, run: str) -> str:
+def _beyond(found: PassedLimit, shown: Shown, run: str) -> str:
     """How a variable passes a limit, in words: which run, which limit, when and by how much."""
     limit, worst = float(shown.of(found.limit)), float(shown.of(found.worst))
     unit = f" {shown.unit}" if shown.unit.strip("1") else ""

@@ -17,8 +17,8 @@ def leaves(
     reference_time: np.ndarray,
     reference: np.ndarray,
     nominal: float = 1.0,
-) -> float | None:
-    """The first time at which the reference is outside of the tube around the values; None if it stays inside.
+) -> np.ndarray:
+    """The times at which the reference is outside of the tube around the values.
 
     The tube is the union of the rectangles around all points of the trajectory, the straight lines between its points
     and the jumps at its double times included: half widths of 0.2 % of the reference's range and of the run's time.
@@ -35,7 +35,7 @@ def leaves(
     inside |= ~finite
     inside &= (begin <= time[-1]) & (end >= time[0])
     inside |= _pulses(reference_time, inside)
-    return None if inside.all() else float(reference_time[np.argmin(inside)])
+    return reference_time[~inside]
 
 
 def _pulses(time: np.ndarray, inside: np.ndarray) -> np.ndarray:

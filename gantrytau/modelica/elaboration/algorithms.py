@@ -12,13 +12,14 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, Surroundings, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
+from gantrytau.modelica.references import Members
 
 MOST_ROUNDS = 100_000  # of a `while`
 

@@ -1,11 +1,9 @@
 """Classes of Modelica text as classes of the language: declarations in the body, equations that read the tree."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import reduce
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast
-
-import casadi as ca
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
@@ -18,6 +16,7 @@ from gantrytau.modelica.conditions import (
     BEHIND,
     TURN,
     calls_before,
+    chain_of,
     changed_in,
     checks_in,
     first_valued,
@@ -25,6 +24,7 @@ from gantrytau.modelica.conditions import (
     gives_value_before,
     guarded_samples,
     instants,
+    is_call,
     sample_calls,
     sample_name,
     targets,
@@ -40,7 +40,7 @@ from gantrytau.modelica.elaboration.statements import (
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
-from gantrytau.modelica.elaboration.whens import at_start, follows
+from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
 from gantrytau.modelica.references import dotted, nodes_of
 
 TAKEN = "a name that is taken, expected another name"
@@ -213,9 +213,16 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
     for section in structure.scope.sections:
         for item in section.items if section.kind == "initial equation" else ():
             name = first_valued(item)
-            if name in held and isinstance(item, tree.SimpleEquation) and structure.is_fixed(item.right):
+            if not isinstance(item, tree.SimpleEquation):
+                continue
+            names = chain_of(name, structure.scope.sections) if dotted(item.left) else [name]
+            if is_call(item.right, "pre"):
+                if chain_of(dotted(cast(Any, item.right).arguments[0]), structure.scope.sections)[-1] == name:
+                    structure.started.append(item)  # holds by the equations between the two
+            elif names[-1] in held and structure.is_fixed(item.right):
                 structure.started.append(item)
-                yield name, Bound(Modifier(item.right, section.scope, at=item.at), structure)
+                for one in filter(held.__contains__, names):
+                    yield one, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
 def _held(structure: Structure) -> Iterator[str]:
@@ -355,7 +362,7 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
             items = (
                 [i for i in items if first_valued(i) not in held and not gives_value_before(i)]
                 if initial
-                else _set_by_whens(items, held)
+                else set_by_whens(items, held)
             )
         if section.kind == "constraint" or (initial and not starts) or not items:
             continue
@@ -369,27 +376,6 @@ def _sections(instance: Any, initial: bool) -> Iterator[Any]:
             if starts and not initial:
                 firsts += found
             else:
-                yield from (_begun(one, firsts) for one in found)
+                yield from (begun(one, firsts) for one in found)
         except AbsentComponent as error:
             raise ModelError(f"found {error} in an equation, expected a component that is there") from None
-
-
-def _set_by_whens(items: Iterable[Any], held: Collection[str]) -> list[tree.Assignment]:
-    """The initial equations of what a `when` sets, as assignments."""
-    found = (
-        (one, tree.ComponentReference(one.at, ((name, ()),)))
-        for one in items
-        if (name := first_valued(one)) in held
-    )
-    return [tree.Assignment(one.at, None, None, False, (left,), one.right) for one, left in found]
-
-
-def _begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
-    """A statement; a chain of `when` also gives what it sets the values of initial sections."""
-    if not isinstance(stated, WhenChain) or not firsts:
-        return stated
-    actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]
-    names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
-    scalars = (scalar for one in firsts for scalar in one.elements())
-    own = tuple(one for one in scalars if one.dep(0).name() in names)
-    return WhenChain((at_start(own), *stated.branches)) if own else stated

@@ -14,47 +14,9 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
-from gantrytau.modelica.references import dotted
+from gantrytau.modelica.references import Members, dotted
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
-
-
-class Members(Protocol):
-    """An instance of a class: a component, a package with its constants, or what a function computes with."""
-
-    def has(self, name: str) -> bool:
-        """Whether its class has a component of that name."""
-        ...
-
-    def member(self, name: str) -> Any:
-        """The value of a component."""
-
-    def names(self) -> Sequence[str]:
-        """Names of its components."""
-        ...
-
-    def shape(self, name: str) -> tuple[int, ...] | None:
-        """The sizes of a component; None where only its value has them."""
-
-    def next_sample(self, call: tree.Call) -> Any:
-        """The next instant of a `sample`; of `initial()` whether it is the start, 1 or 0."""
-
-    def before(self, name: str, asked: str) -> Any:
-        """The Discrete that follows a variable of that dotted name, as `pre`, `edge` or `change` asks; None without one."""
-
-    def turn(self, name: str) -> Any:
-        """The parity of the changes of a variable that a Discrete follows; None for another one."""
-
-    def type_of(self, reference: tree.ComponentReference) -> str:
-        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
-        ...
-
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        """The least and the greatest value of an Integer; None for a Boolean."""
-
-    def is_fixed(self, expression: tree.Expression) -> bool:
-        """Whether it holds parameters and constants only."""
-        ...
 
 
 class Surroundings(Protocol):

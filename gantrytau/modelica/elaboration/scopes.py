@@ -7,10 +7,10 @@ from typing import NoReturn
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import with_pulses
 from gantrytau.modelica.elaboration import modifiers
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
 from gantrytau.modelica.optimizations import HORIZON
-from gantrytau.modelica.pulses import with_pulses
 from gantrytau.modelica.source import SourceText
 
 ELEMENT_SECTIONS = ("", "public", "protected")

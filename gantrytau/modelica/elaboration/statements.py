@@ -19,11 +19,11 @@ from gantrytau.modelica.conditions import (
     is_call,
 )
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Members, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.elaboration.whens import chosen_actions, when_chains
-from gantrytau.modelica.references import nodes_of
+from gantrytau.modelica.references import Members, nodes_of
 
 
 class AbsentComponent(Exception):

@@ -50,11 +50,9 @@ class Structure:
                 one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
-                one.scope.refuse(
-                    one.at,
-                    f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component; extend "
-                    f"{self.scope.name} to modify it",
-                )
+                where = self.scope.name
+                words = f"found '{name}' modified, which is protected in {where}, expected a public component"
+                one.scope.refuse(one.at, f"{words}; extend {where} to modify it")
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
     def has(self, name: str) -> bool:
@@ -378,22 +376,17 @@ class ClassMember:
             scope.refuse(clause.at, f"found components of {len(self.shape)} dimensions, expected one")
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
-            scope.refuse(
-                clause.at,
-                f"found a component of {kind.name}, which is partial, expected a class that extends it",
-            )
+            words = f"found a component of {kind.name}, which is partial, expected a class that extends it"
+            scope.refuse(clause.at, words)
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        said = (
-            [self.full.of_element(k, self.shape[0]) for k in range(self.shape[0])]
-            if self.shape
-            else [self.full]
-        )
+        each = [self.full.of_element(k, count) for count in self.shape for k in range(count)]
+        said = each if self.shape else [self.full]
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
-        around = self.owner
-        while around is not None:
-            if around.scope.definition is kind.definition:
-                scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
+        around: Structure | None = self.owner
+        while around is not None and around.scope.definition is not kind.definition:
             around = around.around
+        if around is not None:
+            scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
 
     def _inner(self) -> "ClassMember | None":

@@ -1,6 +1,6 @@
 """What `when` of Modelica text amounts to: chains of the language, and Discretes that follow variables (chapter 8.3.5)."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import reduce
 from typing import Any, cast
@@ -16,6 +16,7 @@ from gantrytau.modelica.conditions import (
     Items,
     changed_in,
     checks_in,
+    first_valued,
     instant_and_rest,
     is_call,
     sample_calls,
@@ -88,6 +89,8 @@ def _happenings(
         found = values.condition(_stays(edge, reader))
         if isinstance(found, ca.SX):
             refuse_change(found)
+        elif found is False:
+            found = time < -1e30  # never
         sampled = any(sample_calls(one))
         turns = map(reader.members.turn, sorted(set(changed_in(one, items))))
         for each in _both(found, [turn for turn in turns if turn is not None]):
@@ -149,3 +152,24 @@ def _both(change: Any, turns: Sequence[ca.SX]) -> Iterator[Any]:
     odd = [turn > 0.5 for turn in turns]
     other = reduce(lambda a, b: logic_or(logic_and(a, logic_not(b)), logic_and(b, logic_not(a))), odd)
     yield from (logic_and(change, other), logic_and(change, logic_not(other)))
+
+
+def set_by_whens(items: Iterable[Any], held: Collection[str]) -> list[tree.Assignment]:
+    """The initial equations of what a `when` sets, as assignments."""
+    found = (
+        (one, tree.ComponentReference(one.at, ((name, ()),)))
+        for one in items
+        if (name := first_valued(one)) in held
+    )
+    return [tree.Assignment(one.at, None, None, False, (left,), one.right) for one, left in found]
+
+
+def begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
+    """A statement; a chain of `when` also gives what it sets the values of initial sections."""
+    if not isinstance(stated, WhenChain) or not firsts:
+        return stated
+    actions = [action for one in stated.branches for action in one.actions if isinstance(action, ca.SX)]
+    names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
+    scalars = (scalar for one in firsts for scalar in one.elements())
+    own = tuple(one for one in scalars if one.dep(0).name() in names)
+    return WhenChain((at_start(own), *stated.branches)) if own else stated

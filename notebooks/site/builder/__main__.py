@@ -12,6 +12,7 @@ from notebooks.site.builder.gallery.drawn_examples import drawn_examples
 from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import error_pages
 from notebooks.site.builder.generated.gallery_page import gallery_page
+from notebooks.site.builder.generated.library_page import library_page
 from notebooks.site.builder.generated.reference_pages import reference_pages
 from notebooks.site.builder.generated.source_page import source_page
 from notebooks.site.builder.generated.thesis_page import pictures, thesis_pages
@@ -36,6 +37,7 @@ def main() -> int:
     told(begin, f"{len(drawn)} examples drawn")
     single = {
         "gallery/index.md": gallery_page(drawn),
+        "library/index.md": library_page(),
         "command_line/index.md": command_page(),
         "sources/index.md": source_page(),
     }

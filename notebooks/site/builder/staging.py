@@ -35,6 +35,7 @@ GENERATED = (
     "reference",
     "messages",
     "thesis",
+    "library",
     "command_line",
     "sources",
     "gallery",

@@ -30,6 +30,7 @@ PARTS = (
     "why",
     "said",
     "small",
+    "scene",
     "printed",
 )  # of a row
 
@@ -58,7 +59,10 @@ class Printed:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A figure or a table: number, subject, code before the call, the call, names in it, a page, or why there is none."""
+    """A figure or a table: number, subject, code before the call, the call, names in it, a page, or why there is none.
+
+    scene: a picture of a camera, which stays as it is on dark pages.
+    """
 
     kind: str
     number: str
@@ -70,6 +74,7 @@ class Item:
     why: str = ""
     said: str = ""
     small: str = ""
+    scene: bool = False
     printed: Sequence[Printed] = ()
 
     @property

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,17 +10,14 @@ from gantrytau import ModelError, Result
 from gantrytau.border.checks import number
 from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
-from gantrytau_optimica.predictive.stages import Stages
-
-if TYPE_CHECKING:
-    from gantrytau_optimica.predictive.mpc import Mpc
-    from gantrytau_optimica.predictive.plan import Timing
+from gantrytau_optimica.predictive.plan import StepTimes
+from gantrytau_optimica.predictive.stages import HorizonStages
 
 PARTS = 4  # steps of the plant in a period
 
 
 @dataclass(frozen=True, eq=False)
-class Loop(Record):
+class ClosedLoop(Record):
     """A closed loop, looked up by the model's names as its `result`: `loop["crane.s"]`, (times,).
 
     result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
@@ -29,7 +26,7 @@ class Loop(Record):
 
     result: Result
     statuses: tuple[str, ...]
-    timing: "Timing"
+    timing: StepTimes
     cost: float
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -51,14 +48,14 @@ class Loop(Record):
 
 
 def closed_loop(
-    mpc: "Mpc",
-    plant: "tuple[Any, Stages]",
+    mpc: Any,
+    plant: "tuple[Any, HorizonStages]",
     stop: float,
     start: Mapping[str, Any],
     noise: Mapping[str, float],
     seed: int,
-) -> Loop:
-    """Controller and plant from start to stop; the plant moves exactly between samples, to the order of its steps."""
+) -> ClosedLoop:
+    """An Mpc and a plant from start to stop; between samples the plant is integrated in steps of a quarter of a period."""
     built, stages = plant
     if (
         tuple(s.name for s in stages.phase.states) != mpc.states
@@ -108,4 +105,4 @@ def closed_loop(
     found = mpc.result(
         0.0, np.array(states), np.array(unknowns), np.array(inputs), f"{mpc.name}, closed loop", built
     )
-    return Loop(found, tuple(statuses), mpc.timing, cost)
+    return ClosedLoop(found, tuple(statuses), mpc.timing, cost)

@@ -48,14 +48,19 @@ class Found:
 
 
 class HorizonProgram:
-    """The program for one number of stages, solved again and again. soft: which rows of a stage are, (rows,)."""
+    """The program for one number of stages, solved again and again.
 
-    def __init__(self, stages: int, nx: int, nu: int, soft: np.ndarray, penalty: float):
-        self.stages, self.nx, self.nu, self.soft, self.penalty = stages, nx, nu, soft, penalty
+    soft (rows,): which rows of a stage are; finite (2, rows): whether they have a lower and an upper end.
+    """
+
+    def __init__(self, stages: int, nx: int, nu: int, soft: np.ndarray, finite: np.ndarray, penalty: float):
+        self.stages, self.nx, self.nu, self.penalty = stages, nx, nu, penalty
         self.slack = bool(soft.any())
         self.each = nx + nu + self.slack
-        # a soft row is two, one for each side
-        self.rows = soft.size + int(soft.sum())
+        # a soft row is one for each of its ends
+        self.hard, below, above = (np.flatnonzero(one) for one in (~soft, soft & finite[0], soft & finite[1]))
+        self.below, self.above = below, above
+        self.rows = self.hard.size + below.size + above.size
         n, each = stages, self.each
         block = np.ones((each, each), bool)
         self._hessian = _Pattern([block] * n + [np.ones((nx, nx), bool)], each, each)
@@ -67,7 +72,7 @@ class HorizonProgram:
 
     def solve(self, stage: Stage, P: np.ndarray, p: np.ndarray, first: np.ndarray) -> Found:
         """Changes that solve it. P, p: of the last state; first (nx,): the change of the first one, which is known."""
-        n, nx, nu, each, soft, slack = self.stages, self.nx, self.nu, self.each, self.soft, self.slack
+        n, nx, nu, each, slack = self.stages, self.nx, self.nu, self.each, self.slack
         ridge = RIDGE * max(
             float(np.abs(stage.H).max(initial=0.0)), float(np.abs(P).max(initial=0.0)), 1e-300
         )
@@ -78,24 +83,24 @@ class HorizonProgram:
         g[:, : nx + nu] = stage.g
         M = np.zeros((n, nx, each + nx))
         M[:, :, :nx], M[:, :, nx : nx + nu], M[:, :, each:] = stage.A, stage.B, -np.eye(nx)
+        kept = np.concatenate([self.hard, self.below, self.above])
+        last, first_above = self.hard.size, self.hard.size + self.below.size
         G = np.zeros((n, self.rows, each))
-        CD = np.concatenate([stage.C, stage.D], axis=2)
-        G[:, : soft.size, : nx + nu], G[:, soft.size :, : nx + nu] = CD, CD[:, soft]
-        low, high = np.full((2, n, self.rows), FAR)
-        low[:, : soft.size], high[:, : soft.size] = -stage.lower, np.where(soft, FAR, stage.upper)
-        high[:, soft.size :] = stage.upper[:, soft]
+        G[:, :, : nx + nu] = np.concatenate([stage.C, stage.D], axis=2)[:, kept]
+        low, high = -stage.lower[:, kept], stage.upper[:, kept]
+        high[:, last:first_above], low[:, first_above:] = FAR, FAR
         lower, upper = np.full((2, n, each), FAR)
         lower[:, nx : nx + nu], upper[:, nx : nx + nu] = -stage.lower_u, stage.upper_u
         lower[0, :nx], upper[0, :nx] = -first, first
         if slack:
             H[:, -1, -1] = g[:, -1] = self.penalty
-            G[:, : soft.size, -1], G[:, soft.size :, -1] = soft, -1.0
+            G[:, last:first_above, -1], G[:, first_above:, -1] = 1.0, -1.0
             lower[:, -1] = 0.0
         free = np.full(nx, FAR)
         terms = (
             self._hessian.filled([H.ravel(), (P + ridge * np.eye(nx)).ravel()]), np.append(g.ravel(), p),
             self._dynamics.filled([M.ravel()]), -stage.b.ravel(),
-            self._limits.filled([G.ravel()]), -low.ravel(), high.ravel(),
+            self._limits.filled([G.ravel()]), -np.minimum(low, FAR).ravel(), np.minimum(high, FAR).ravel(),
             -np.append(lower.ravel(), free), np.append(upper.ravel(), free),
         )  # fmt: skip
         if self._solver is None:

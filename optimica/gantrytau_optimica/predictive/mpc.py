@@ -9,16 +9,16 @@ import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.border.checks import array, number, one_of, whole
+from gantrytau.border.checks import array, instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import ControlProblem
-from gantrytau_optimica.predictive.closed_loop import PARTS, Loop, closed_loop
+from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
-from gantrytau_optimica.predictive.plan import Timing, Trajectory, first_plan, guessed_plan
-from gantrytau_optimica.predictive.stages import Linear, Stages
+from gantrytau_optimica.predictive.plan import PlannedMotion, StepTimes, first_plan, guessed_plan
+from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.read_problem import read_problem
@@ -75,13 +75,14 @@ class Mpc:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages = _staged(problem, self.period)
         self.name = self.built.read.name
-        soft = self._soft(hard)
+        self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, weight)
+        finite = np.isfinite(self._stages.rows)
+        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
         self._terminal = Terminal(self._stages, self.elements * self.period)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
-        self._plan: Trajectory | None = None
+        self._plan: PlannedMotion | None = None
         self._prepared: tuple[float, Linear] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
@@ -105,9 +106,9 @@ class Mpc:
         return tuple(s.name for s in self._stages.phase.inputs)
 
     @property
-    def timing(self) -> Timing:
+    def timing(self) -> StepTimes:
         """What all steps took until now."""
-        return Timing(tuple(self._preparations), tuple(self._steps), self._missed)
+        return StepTimes(tuple(self._preparations), tuple(self._steps), self._missed)
 
     @property
     def plan(self) -> Result:
@@ -146,7 +147,7 @@ class Mpc:
         self._steps.append(time.perf_counter() - begin)
         return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
 
-    def _iterated(self, x: np.ndarray, t: float) -> tuple[Trajectory, bool, float]:
+    def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
         """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
         first, change = self._plan is None, math.inf
         plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
@@ -173,7 +174,7 @@ class Mpc:
             self._prepared = plan.t, self._linear(plan)
         self._preparations.append(time.perf_counter() - begin)
 
-    def _linear(self, plan: Trajectory) -> Linear:
+    def _linear(self, plan: PlannedMotion) -> Linear:
         times = plan.t + self.period * np.arange(self.elements)
         return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
 
@@ -213,7 +214,7 @@ class Mpc:
         start: Mapping[str, Any] | None = None,
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
-    ) -> Loop:
+    ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
         plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
@@ -222,7 +223,11 @@ class Mpc:
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
-        other = _staged(plant, step) if plant is not None else (self.built, Stages(self.built.problem, step))
+        other = (
+            _staged(plant, step)
+            if plant is not None
+            else (self.built, HorizonStages(self.built.problem, step))
+        )
         return closed_loop(self, other, stop, start or {}, noise or {}, seed)
 
     @property
@@ -237,6 +242,9 @@ class Mpc:
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
         flat, found = self.built.read.dae.flat, {}
+        instance(
+            self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
+        )
         for name, value in measured.items():
             elements = flat.expand(name)
             unknown = [one for one in elements if one not in self.states]
@@ -264,12 +272,12 @@ class Mpc:
         plan = self._first(x, t) if self._plan is None else self._plan
         return self._stages.moved(x, plan.w[0], self._applied, t)[self._stages.last]
 
-    def _first(self, x: np.ndarray, t: float) -> Trajectory:
+    def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
         """A plan to begin with: at rest, or the guess."""
         plan = first_plan(self._stages, self.elements, x, t)
         return plan if self._guess is None else guessed_plan(self._stages, plan, self._guess)
 
-    def _solved(self, plan: Trajectory, linear: Linear, x: np.ndarray) -> Found:
+    def _solved(self, plan: PlannedMotion, linear: Linear, x: np.ndarray) -> Found:
         stages = self._stages
         lower, upper = stages.rows
         H, g = self._terminal.added(linear, plan)
@@ -297,11 +305,11 @@ class Mpc:
 
     def _passed(self, found: Found) -> tuple[str, ...]:
         """Words of the soft limits, where the plan passes one."""
-        passed = zip(self._stages.row_names, self._program.soft & np.any(found.slack > 1e-6), strict=True)
+        passed = zip(self._stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 
-def _staged(problem: Any, period: float) -> tuple[Any, Stages]:
+def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
     """The problem in states, algebraics and inputs, and its stages; ModelError for what no receding horizon can have."""
     read = read_problem(problem)
     built = build(read, {}, (), {}, "forward")
@@ -317,4 +325,4 @@ def _staged(problem: Any, period: float) -> tuple[Any, Stages]:
         )
     if not any(phase.inputs for phase in found.phases):
         raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, Stages(found, period)
+    return built, HorizonStages(found, period)

@@ -12,11 +12,11 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.predictive.horizon_qp import Found
-from gantrytau_optimica.predictive.stages import NODES, Linear, Stages
+from gantrytau_optimica.predictive.stages import NODES, HorizonStages, Linear
 
 
 @dataclass(frozen=True)
-class Timing(Record):
+class StepTimes(Record):
     """What steps took, in s. preparation: before a measurement; step: from a measurement to its inputs; missed: how many
     steps were later than the deadline.
     """
@@ -46,7 +46,7 @@ class Timing(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class PlannedMotion:
     """A plan in scaled variables: nodes x (N + 1, nx), unknowns of stages w (N, nw), inputs u (N, nu), from time t in s."""
 
     x: np.ndarray
@@ -54,29 +54,31 @@ class Trajectory:
     u: np.ndarray
     t: float
 
-    def changed(self, linear: Linear, found: Found) -> "Trajectory":
+    def changed(self, linear: Linear, found: Found) -> "PlannedMotion":
         """The plan after a step of Gauss-Newton's method."""
         v = np.concatenate([np.ones((len(self.u), 1)), found.x[:-1], found.u], axis=1)
         w = self.w + np.einsum("nij,nj->ni", linear.w, v)
-        return Trajectory(self.x + found.x, w, self.u + found.u, self.t)
+        return PlannedMotion(self.x + found.x, w, self.u + found.u, self.t)
 
-    def shifted(self, t: float, period: float) -> "Trajectory":
+    def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
         n = len(self.u)
         by = min(max(round((t - self.t) / period), 0), n)
         rest = np.minimum(np.arange(n) + by, n - 1)
         nodes = np.minimum(np.arange(n + 1) + by, n)
-        return Trajectory(self.x[nodes], self.w[rest], self.u[rest], t)
+        return PlannedMotion(self.x[nodes], self.w[rest], self.u[rest], t)
 
 
-def first_plan(stages: Stages, elements: int, x: np.ndarray, t: float) -> Trajectory:
+def first_plan(stages: HorizonStages, elements: int, x: np.ndarray, t: float) -> PlannedMotion:
     """The state at rest, inputs at zero or the limit next to it."""
     z = np.array([s.guess(np.zeros(1))[0] for s in stages.phase.algebraics]) / stages.sizes_z
     u = np.clip(np.zeros((elements, stages.nu)), stages.lower_u, stages.upper_u)
-    return Trajectory(np.tile(x, (elements + 1, 1)), np.tile(np.append(x, z), (elements, 2)), u, t)
+    return PlannedMotion(np.tile(x, (elements + 1, 1)), np.tile(np.append(x, z), (elements, 2)), u, t)
 
 
-def guessed_plan(stages: Stages, plan: Trajectory, guess: Mapping[str, Any] | Result | Answer) -> Trajectory:
+def guessed_plan(
+    stages: HorizonStages, plan: PlannedMotion, guess: Mapping[str, Any] | Result | Answer
+) -> PlannedMotion:
     """A plan with signals as a guess has them: an answer, or name -> number or function of time."""
     n, each = len(plan.u), stages.nx + stages.nz
     times = plan.t + stages.step * np.arange(n + 1)

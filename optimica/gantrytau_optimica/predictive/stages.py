@@ -43,7 +43,7 @@ class Linear:
     w: np.ndarray
 
 
-class Stages:
+class HorizonStages:
     """The functions of a phase over N stages of length h, in variables scaled by their nominal sizes."""
 
     def __init__(self, problem: ControlProblem, step: float):

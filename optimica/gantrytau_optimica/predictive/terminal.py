@@ -7,10 +7,10 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from gantrytau import ModelError
-from gantrytau_optimica.predictive.stages import Linear, Stages, convex
+from gantrytau_optimica.predictive.stages import HorizonStages, Linear, convex
 
 if TYPE_CHECKING:
-    from gantrytau_optimica.predictive.plan import Trajectory
+    from gantrytau_optimica.predictive.plan import PlannedMotion
 
 TURNS = 50
 SETTLED = 1e-10
@@ -19,7 +19,7 @@ SETTLED = 1e-10
 class Terminal:
     """The objective of values at the end, `objective()` of `final(...)`, as a part of the last stage."""
 
-    def __init__(self, stages: Stages, horizon: float):
+    def __init__(self, stages: HorizonStages, horizon: float):
         problem, phase = stages.problem, stages.phase
         ends = [p for p in phase.points if isinstance(p.time, str) and p.time == "final"]
         known = {e.element_hash() for p in ends for e in p.symbol.elements()}
@@ -57,7 +57,7 @@ class Terminal:
             hessian, gradient = ca.hessian(cost, y)
             self._function = ca.Function("end", [y, t, courses], [ca.densify(gradient), ca.densify(hessian)])
 
-    def added(self, linear: Linear, plan: "Trajectory") -> tuple[np.ndarray, np.ndarray]:
+    def added(self, linear: Linear, plan: "PlannedMotion") -> tuple[np.ndarray, np.ndarray]:
         """Hessians and gradients of all stages, with what the end adds to the last one."""
         if not self._there:
             return linear.H, linear.g
@@ -77,7 +77,7 @@ class Terminal:
 class SteadyState:
     """The state of rest that costs least at a time, and what it costs to come back to it for ever, 1/2 x' P x (Riccati)."""
 
-    def __init__(self, stages: Stages):
+    def __init__(self, stages: HorizonStages):
         self.stages = stages
         nz = stages.nz
         start = np.array([s.guess(np.zeros(1))[0] for s in stages.phase.states]) / stages.sizes_x

@@ -112,7 +112,10 @@ def _told(item: Item, one: Made | None, shown: set[str]) -> str:
     shown.update(code_before(item))
     text = f"{said}{why}```python\n{chr(10).join([*before, item.call.strip()])}\n```\n\n"
     if one:
-        text += "".join(f"![{item.kind} {item.number}]({name})\n\n" for name in pictures(item, one))
+        for name in pictures(item, one):
+            alt = f"{item.kind} {item.number}"
+            scene = f"```{{image}} {name}\n:alt: {alt}\n:class: scene\n```\n\n"
+            text += scene if item.scene else f"![{alt}]({name})\n\n"
         text += f"```text\n{one.text}\n```\n\n" if one.text else ""
         text += _numbers(item.printed, one.values) if item.printed else ""
     see = ", ".join([*map(_name, item.names), *filter(None, [_page(item.page)])])

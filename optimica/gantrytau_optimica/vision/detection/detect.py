@@ -42,12 +42,7 @@ def detect(
     """
     whole("detect", "background", background, least=0)
     up = number("detect", "up", up)
-    frames = images.frames if isinstance(images, Images) else images
-    if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
-        found = Given("images", images)
-        raise ModelError(
-            "expected a list with a folder or an array for each camera", place="detect", found=found
-        )
+    frames = _frames_of(images)
     instance("detect", "pattern", pattern, Pattern, "a Pattern, as Pattern.quincunx(0.06)")
     cameras = [image_series(each, f"camera {c + 1}") for c, each in enumerate(frames)]
     numbers = rows_of(cameras)
@@ -58,9 +53,12 @@ def detect(
         np.full(shape[:2], "file", "U12"),
     )
     findings: list[Finding] = []
+    candidates: dict[tuple[int, int], Array] = {}
+    backgrounds: list[Array | None] = []
     for c, series in enumerate(cameras):
         still, few = _background(series, background if pattern.kind == "quincunx" else 0)
         findings += few
+        backgrounds.append(still)
         for k, file in enumerate(numbers):
             grey = series.load(file) if file in series.numbers else None
             if grey is None:
@@ -69,6 +67,7 @@ def detect(
                 seen = find_charuco(grey, pattern, normalise)
             else:
                 seen = find_quincunx(grey, pattern, still, normalise, up)
+                candidates[c, k] = seen.candidates
             steps[c, k] = seen.step
             if seen.edges is not None:
                 corners[c, k], sigma[c, k] = seen.edges.corners, seen.edges.sigma
@@ -76,7 +75,19 @@ def detect(
         findings += told_up(corners, sigma, up)
     findings += [finding for c, each in enumerate(steps) for finding in _lost(each, c)]
     size = np.array([series.size for series in cameras])
-    return Detections(pattern, corners, sigma, steps, size, np.array(numbers), tuple(findings))
+    seen_besides = candidates, tuple(backgrounds)
+    return Detections(pattern, corners, sigma, steps, size, np.array(numbers), tuple(findings), *seen_besides)
+
+
+def _frames_of(images: Images | Sequence[Any]) -> Sequence[Any]:
+    """The images of each camera; ModelError where there are none."""
+    frames = images.frames if isinstance(images, Images) else images
+    if isinstance(frames, (str, np.ndarray)) or not isinstance(frames, Sequence) or not len(frames):
+        found = Given("images", images)
+        raise ModelError(
+            "expected a list with a folder or an array for each camera", place="detect", found=found
+        )
+    return frames
 
 
 def _background(series: ImageSeries, count: int) -> tuple[Array | None, list[Finding]]:

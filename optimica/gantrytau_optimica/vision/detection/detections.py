@@ -3,17 +3,23 @@
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.describing.record import Record
+from gantrytau.results.figures import check_suffix, finished
 from gantrytau.whole_files import replacing
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.vision.boards import Pattern
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = np.ndarray
 ARRAYS = ("corners", "sigma", "steps", "size", "numbers")
@@ -36,7 +42,9 @@ class Detections(Record):
     corners: (C, N, P, 2) in pixels, in the order of `pattern.points`, NaN where missing; sigma: standard deviation of
     each in pixels, (C, N, P), by how much its edges scatter; steps: (C, N), the step that lost an image, a key of LOST,
     and "" where it was found; size: (width, height) of the images of each camera, (C, 2) in pixels; numbers: of the
-    images, as their files have them, (N,); findings: what was noticed, rows from 0.
+    images, as their files have them, (N,); findings: what was noticed, rows from 0. candidates: corners (k, 4, 2) in pixels
+    of the likeliest black squares, by (camera, row); backgrounds: the median image of each camera, None without. Files
+    of detections hold neither.
     """
 
     pattern: Pattern
@@ -46,6 +54,8 @@ class Detections(Record):
     size: Array
     numbers: Array = field(repr=False)
     findings: tuple[Finding, ...] = ()
+    candidates: Mapping[tuple[int, int], Array] = field(default_factory=dict, repr=False)
+    backgrounds: tuple[Array | None, ...] = field(default=(), repr=False)
 
     @property
     def found(self) -> Array:
@@ -69,6 +79,42 @@ class Detections(Record):
             H = homography(self.pattern.points[there, :2], filled[c, k, there])
             filled[c, k, ~there] = mapped(H, self.pattern.points[~there, :2])
         return filled.mean(axis=2)
+
+    def plot(
+        self, image: Array, camera: int = 0, row: int = 0, *, file: str | os.PathLike[str] | None = None
+    ) -> "Figure":
+        """Candidates for squares and measured corners over an image (height, width): Dressler (2012), Figure 5.13."""
+        import matplotlib.pyplot as plt
+
+        if file is not None:
+            check_suffix(file)
+        figure, axis = plt.subplots(figsize=(8.0, 6.2), layout="constrained")
+        axis.imshow(image, cmap="gray")
+        squares = self.candidates.get((camera, row), np.zeros((0, 4, 2)))
+        for k, square in enumerate(squares):
+            axis.plot(*square[[0, 1, 2, 3, 0]].T, color="C1", label="" if k else "candidates for squares")
+        axis.plot(*self.corners[camera, row].T, "x", color="C0", label="corners")
+        axis.set_axis_off()
+        axis.legend()
+        return finished(figure, file)
+
+    def plot_background(self, camera: int = 0, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """The median image of a camera: Dressler (2012), Figure 5.12. Raises ModelError where none was made."""
+        import matplotlib.pyplot as plt
+
+        if file is not None:
+            check_suffix(file)
+        still = self.backgrounds[camera] if camera < len(self.backgrounds) else None
+        if still is None:
+            raise ModelError(
+                f"plot_background: found no median image of camera {camera}, expected one; give detect some images and "
+                "background=10",
+                argument="camera",
+            )
+        figure, axis = plt.subplots(figsize=(8.0, 6.2), layout="constrained")
+        axis.imshow(still, cmap="gray")
+        axis.set_axis_off()
+        return finished(figure, file)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Keep them in a file that `read` reads, .npz."""

@@ -1,6 +1,6 @@
 """A quincunx in one image: from fours of touching corners to twenty measured ones, or the step that ended it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,10 +23,11 @@ TRIED = 40  # fours that are measured
 
 @dataclass(frozen=True, eq=False)
 class Sighting:
-    """What one image shows: the step that lost it, "" if none; corners and sigma as of `Edges`."""
+    """What one image shows: the step that lost it, "" if none; corners and sigma as of `Edges`; candidates (k, 4, 2)."""
 
     step: str
     edges: Edges | None = None
+    candidates: Array = field(default_factory=lambda: np.zeros((0, 4, 2)))
 
 
 def find_quincunx(
@@ -35,7 +36,7 @@ def find_quincunx(
     """The quincunx in an image of grey values (height, width), float32 on the scale of 8 bits."""
     noise = noise_of(grey)
     least = 0.0 if normalise else FIXED
-    step = "corners"
+    step, squares = "corners", np.zeros((0, 4, 2))
     for size in SIZES:
         small = grey if size == 1 else _smaller(grey, size)
         if min(small.shape) < 32:
@@ -43,11 +44,11 @@ def find_quincunx(
         points = saddles(small, least)
         if len(points.places) < 4:
             continue
-        candidates = fours(points)
-        step = max(step, "squares" if len(candidates) == 0 else "edges", key=ORDER.index)
+        squares = points.places[fours(points)[:TRIED]] * size + (size - 1) / 2
+        step = max(step, "squares" if len(squares) == 0 else "edges", key=ORDER.index)
         measured = []
-        for four in candidates[:TRIED]:
-            corners = _from_up(points.places[four] * size + (size - 1) / 2, up)
+        for square in squares:
+            corners = _from_up(square, up)
             H = homography(pattern.side / 2 * AROUND.astype(float), corners)
             if _checks(grey, H, pattern) and not any(_same(H, other) for other, _ in measured):
                 edges = measure_edges(grey, H, pattern, noise, least)
@@ -55,12 +56,12 @@ def find_quincunx(
                     measured.append((H, edges))
         moving = [edges for _, edges in measured if not _stands(grey, edges, background)]
         if len(moving) > 1:
-            return Sighting("ambiguous")
+            return Sighting("ambiguous", candidates=squares)
         if moving:
-            return Sighting("", moving[0])
+            return Sighting("", moving[0], squares)
         if measured:
-            return Sighting("background")
-    return Sighting(light_of(grey, noise) or step)
+            return Sighting("background", candidates=squares)
+    return Sighting(light_of(grey, noise) or step, candidates=squares)
 
 
 def noise_of(grey: Array) -> float:

@@ -1,4 +1,4 @@
-"""`cardinality`: connections are counted on both sides of a component, and choose equations."""
+"""`cardinality` on both sides of a component; steps as graphs of states have them: conditions and values at the start."""
 
 from gantrytau import load_modelica, simulate
 
@@ -65,3 +65,41 @@ def test_an_integer_that_equals_a_value_for_a_while_is_a_condition_of_when(tmp_p
     (tmp_path / "lines.mo").write_text(TEXT)
     result = simulate(load_modelica(tmp_path / "lines.mo")["Lines.Steps"](), stop=3.0)
     assert [float(result.at(t, "counted")) for t in (0.5, 1.5, 2.5)] == [0, 10, 10]
+
+
+STEPS = """package Grafcet
+  model Step
+    output Boolean active, localActive;
+    Boolean newActive;
+    input Boolean set, reset;
+    parameter Boolean first = false;
+  initial equation
+    active = first;
+    pre(newActive) = pre(localActive);
+  equation
+    active = localActive;
+    localActive = pre(newActive);
+    newActive = set or localActive and not reset;
+    when false then
+      terminate("never");
+    end when;
+  end Step;
+  model Whole
+    Step a(first = true), b;
+    Boolean fire;
+  equation
+    fire = a.localActive and time > 1;
+    a.set = false;
+    a.reset = fire;
+    b.set = fire;
+    b.reset = false;
+  end Whole;
+end Grafcet;
+"""
+
+
+def test_an_initial_value_reaches_what_it_equals_before_the_start(tmp_path):
+    (tmp_path / "steps.mo").write_text(STEPS)
+    result = simulate(load_modelica(tmp_path / "steps.mo")["Grafcet.Whole"](), stop=2.0)
+    states = [[float(result.at(t, f"{name}.active")) for t in (0.5, 1.5)] for name in "ab"]
+    assert states == [[1, 0], [0, 1]]

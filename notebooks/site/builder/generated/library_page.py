@@ -1,0 +1,57 @@
+"""The page of the Modelica library's examples: what became of each, from `library_results.toml`."""
+
+import statistics
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from notebooks.site.builder.generated.component_tables import table
+from notebooks.site.builder.places import SOURCES
+from notebooks.site.builder.reading.docstrings import escaped
+
+OPENING = """# Examples of the Modelica Standard Library
+
+`make library-results` reads each example from the library's own text, simulates it with start, stop and tolerance of the
+reference, and compares it with the reference trajectories of the Modelica Association. An example has passed when all its
+signals stay in a tube: 0.2 % of the range high and 0.2 % of the time wide. Two exceptions are no part of that rule: 1e-6 of
+the largest value (or of 1, if that is larger) is noise, and a pulse of the reference that lasts less than a millionth of the
+run may be outside, as a flag between the release of a brake and its first motion has no width in exact arithmetic.
+
+Neither the library nor its results come with this project. With both at hand:
+
+```text
+MODELICAPATH=... REFERENCE_RESULTS=... make library-results ONLY=Modelica.Mechanics.Rotational
+```
+
+Outcomes are kept, so that an interrupted run goes on; `AGAIN=1` runs all anew, `TIME_LIMIT=120` changes the limit of 60 s of
+processor time for an example. Where a signal leaves within the first hundredth of the run alone, the beginning is run again
+with output times that are as many. Times below are processor time: from text to the integration, and the integration.
+"""
+WORDS = ("passed", "left", "refused", "not run", "no reference")
+HEAD = ("package", "examples", *WORDS, "translate, s", "simulate, s", "library", "date")
+
+
+def library_page() -> str:
+    """The page in Markdown."""
+    packages = tomllib.loads((SOURCES / "library_results.toml").read_text(encoding="utf-8"))["package"]
+    text = f"{OPENING}\n## By package\n\n{table('', HEAD, list(map(_row, packages)))}\n\n## What did not pass\n\n"
+    wrong = [
+        (f"`{one['name']}`", one["word"], escaped(one["detail"]))
+        for package in packages
+        for one in package["example"]
+        if one["word"] != "passed"
+    ]
+    return f"{text}{table('', ('example', '', 'first signal that leaves, or message'), wrong)}\n"
+
+
+def _row(package: Mapping[str, Any]) -> Sequence[str]:
+    examples = package["example"]
+    held = [one for one in examples if one["word"] == "passed"]
+    counts = [str(sum(one["word"] == word for one in examples)) for word in WORDS]
+    times = [_median(one[stage] for one in held) for stage in ("translate", "simulate")]
+    return (f"`{package['name']}`", str(len(examples)), *counts, *times, package["library"], package["date"])
+
+
+def _median(seconds: Iterable[float]) -> str:
+    values = list(seconds)
+    return f"{statistics.median(values):.2g}" if values else ""
