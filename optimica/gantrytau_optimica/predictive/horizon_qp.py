@@ -3,9 +3,10 @@
     min  sum of 1/2 v' H v + g' v + penalty (e + e^2 / 2) over the stages  + 1/2 x_N' P x_N + p' x_N,     v = (x, u)
     x_next = A x + B u + b,   lower <= C x + D u <= upper, where soft lower - e <= ... <= upper + e,   e >= 0
 
-A soft limit is an exact penalty: it holds wherever it can, once the penalty is larger than its multiplier. Of the solvers of
-PyPI (piqp, proxsuite, daqp, osqp) and those in CasADi (HPIPM, qrqp, Fatrop) PIQP was the quickest on 40 stages of cart and
-pole: 0.5 ms, with 0.15 ms to pass the numbers; the others took two to forty times as long.
+A soft limit has an exact penalty: it holds wherever it can, once the penalty is larger than its multiplier.
+
+Measured on 40 stages of a cart with a pole: PIQP 0.6 ms by its own interface, which keeps its structure from call to call;
+through CasADi PIQP 1.5 ms, OSQP 1.6, ProxQP 6, qrqp 8, DAQP 13, Fatrop 200, and HPIPM did not reach the tolerance.
 """
 
 from dataclasses import dataclass
