@@ -10,10 +10,8 @@ BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
 SAMPLE = "next_sample"  # begins the name of what holds the next instant of a `sample`
 AT_START = "initial"  # a keyword, which no component has as its name
-BEHIND, TURN = (
-    "before_",
-    "turn_",
-)  # and a variable: its value before an instant, and the parity of its changes
+BEHIND = "before_"  # and a variable: its value before an instant
+TURN = "turn_"  # and a variable: the parity of its changes
 
 
 def is_call(e: tree.Expression, name: str) -> bool:
@@ -22,13 +20,13 @@ def is_call(e: tree.Expression, name: str) -> bool:
 
 
 def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
-    """The conditions of a `when` one by one, those beside `sample` or `edge` apart."""
+    """The conditions of a `when` one by one; of `sample(...) and rest` and `edge(...) and rest` the call alone."""
     conditions = test.items if isinstance(test, tree.ArrayConstructor) else (test,)
     return tuple(instant_and_rest(one)[0] for one in conditions)
 
 
 def instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
-    """`sample(...)` or `edge(...)`, which hold at an instant only, and what stands beside them by `and`."""
+    """A condition in two parts: `sample(...)` or `edge(...)`, and the rest, joined by `and`; without a call the whole, and None."""
     if isinstance(test, tree.Binary) and test.operator == "and":
         for one, other in ((test.left, test.right), (test.right, test.left)):
             if is_call(one, "sample") or is_call(one, "edge"):
@@ -116,7 +114,7 @@ def first_valued(item: tree.EquationOrStatement) -> str:
 
 
 def gives_value_before(item: tree.EquationOrStatement) -> bool:
-    """Whether it is an initial equation of `pre(x)`, which says nothing of an x that nothing asks for before an instant."""
+    """Whether it is an initial equation of `pre(x)`."""
     return (
         isinstance(item, tree.SimpleEquation)
         and isinstance(item.left, tree.Call)
@@ -137,7 +135,7 @@ def sample_name(call: tree.Expression) -> str:
 
 
 def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
-    """A name, and those that it equals by equations `a = b` up to the first `b = pre(c)`; without one the name alone."""
+    """A name and its equals, by equations `a = b`, up to the first `b = pre(c)`; without such an end the name alone."""
     equal: dict[str, tuple[str, bool]] = {}
     for item in (item for section in sections if section.kind == "equation" for item in section.items):
         if isinstance(item, tree.SimpleEquation) and dotted(item.left):
@@ -155,7 +153,7 @@ def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
 
 
 def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:
-    """Equations, those of samples as a `when` that sets the Boolean at each instant and takes it back there."""
+    """Equations with each `b = sample(...)` replaced by a `when`, which sets b at the instant and resets it there."""
     for item in items:
         if not isinstance(item, tree.SimpleEquation) or not is_call(item.right, "sample"):
             yield item

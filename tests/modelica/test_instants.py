@@ -333,3 +333,21 @@ def test_an_assertion_in_a_when_is_looked_at_where_it_acts(tmp_path):
     (tmp_path / "m.mo").write_text(text)
     with pytest.raises(SolveError, match="too far"):
         simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=2.0)
+
+
+def test_a_subscript_that_varies_chooses_and_none_beyond_is_taken(tmp_path):
+    text = """model M
+      parameter Real v[3] = {1, 4, 9};
+      Integer i(start=1);
+      Real m[2, 2] = [1, 2; 3, time], column[2] = m[:, i], x(start=0, fixed=true);
+    equation
+      der(x) = v[integer(time) + 1];
+      when time > 1.5 then i = 2; end when;
+    end M;"""
+    (tmp_path / "m.mo").write_text(text)
+    model = load_modelica(tmp_path / "m.mo")["M"]()
+    found = simulate(model, stop=2.75)
+    np.testing.assert_allclose(found.at(np.array([1.0, 2.0, 2.5]), "x"), [1, 5, 9.5], atol=1e-9)
+    np.testing.assert_allclose(found.at(np.array([1.0, 2.5]), "column[2]"), [3, 2.5], atol=1e-9)
+    with pytest.raises(SolveError, match="stopped at t = 3 s"):
+        simulate(model, stop=4.0)

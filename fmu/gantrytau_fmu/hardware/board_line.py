@@ -70,7 +70,7 @@ class BoardLine:
         self._begun = True
 
     def step(self, given: np.ndarray | list[float]) -> np.ndarray:
-        """One step of the controller: what it finds, (m,), for what it is given, (n,), both in the order of the code."""
+        """One step of the controller: its outputs (m,) for its inputs (n,), both in the order of the code."""
         values = array("BoardLine.step", "given", given, (len(self._code.given),))
         if not self._begun:
             self.reset()

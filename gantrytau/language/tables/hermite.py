@@ -39,7 +39,7 @@ def _quadrant(cross: np.ndarray, k: int, j: int) -> np.ndarray:
 
 
 def _cardinal(x: np.ndarray, outside: str) -> Polynomials:
-    """The cubics that are 1 at one point and those of slope 1 at one point."""
+    """The cardinal cubics: those with value 1 at one point, and those with slope 1 at one point."""
     one, none = np.eye(x.size), np.zeros((x.size, x.size))
     values, slopes = np.hstack([one, none]), np.hstack([none, one])
     return pieces(x, _cubics(x, values, slopes), slopes[[0, -1]], outside)

@@ -255,7 +255,7 @@ def _asked_before(structure: Structure) -> set[str]:
 
 
 def _followed(structure: Structure) -> list[str]:
-    """Variables that Discretes follow, as values before an instant are asked for beside those behind it."""
+    """Names of the variables that need a Discrete with their value before an instant."""
     branches = [branch for item in _whens(structure) for branch in item.branches]
     changes = {name for test, items in branches for name in changed_in(test, items)}
     alone = {id(one) for test, _ in branches for one in instants(test)}

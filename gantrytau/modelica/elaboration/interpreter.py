@@ -269,7 +269,7 @@ class Interpreter:
         return isinstance(found, ca.SX) and not found.is_constant()
 
     def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
-        """The elements of an array at places of which some vary, the last one beyond all."""
+        """The elements of an array at places of which some vary; beyond the array no number, which ends a run."""
         (first, *rest), size = subscripts, len(value)
         if not self._varies(first, size):
             chosen = self.places(first, size)
@@ -277,10 +277,13 @@ class Interpreter:
             return each[0] if isinstance(chosen, int) else values.array(each)
         place = replace(self, end=size).value(first)
         each = [self.indexed(one, rest) for one in value]
-        found = each[-1]
-        for k in reversed(range(size - 1)):
+        beyond: Any = ca.sqrt(-1 - place**2)
+        if isinstance(each[0], np.ndarray):
+            beyond = values.called("fill", [beyond, *np.shape(each[0])], {})
+        found = beyond
+        for k in reversed(range(size)):
             found = values.chosen(place < k + 1.5, each[k], found, self.quiet)
-        return found
+        return values.chosen(place < 0.5, beyond, found, self.quiet)
 
     def places(self, subscript: tree.Expression, size: int) -> int | list[int]:
         """Indices from 0 that a subscript chooses of so many; ModelError beyond."""

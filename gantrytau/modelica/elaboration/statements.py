@@ -229,7 +229,7 @@ def _guarded_asserts(tests: Sequence[tuple[Any, Items]], last: Items, reader: In
 
 
 def _is_assert(item: tree.EquationOrStatement) -> bool:
-    return isinstance(item, tree.ProcedureCall) and item.call.function.parts[-1][0] == "assert"
+    return isinstance(item, tree.ProcedureCall) and is_call(item.call, "assert")
 
 
 def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
@@ -245,7 +245,7 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
 
 
 def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> Iterator[Any]:
-    """The assertion that a call states; where: a condition under which it is asked for."""
+    """The assertion of a call. where: a condition; outside of it nothing is asserted."""
     name = item.call.function.parts[-1][0]
     if name != "assert":
         raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")

@@ -33,7 +33,7 @@ ROUNDING = 1e-6  # of a period, by which an instant may be located early
 def when_chains(
     item: tree.Branching, reader: Interpreter, actions: Callable[[Items, Interpreter], Iterator[Any]]
 ) -> Iterator[WhenChain]:
-    """What a `when` amounts to: its own chain, those of its samples, and what ends the run; actions: reads a branch."""
+    """The chains of a `when`: its own, one for each sample, and those that end the run. actions: reads a branch."""
     yield WhenChain(tuple(_branches(item, reader, actions)))
     for call in (call for test, _ in item.branches for call in sample_calls(test)):
         instant, period = reader.members.next_sample(call), reader.value(call.arguments[1])
@@ -46,10 +46,8 @@ def when_chains(
         if (turn := reader.members.turn(sample_name(call))) is not None:
             yield WhenChain((replace(advance, actions=(turn == 1 - pre(turn),)),))
     for call in (call for _, items in item.branches for call in checks_in(items)):
-        words, flag = (
-            reader.value(call.arguments[-1 if is_call(call, "terminate") else 1]),
-            reader.members.next_sample(call),
-        )
+        words = reader.value(call.arguments[-1 if is_call(call, "terminate") else 1])
+        flag = reader.members.next_sample(call)
         ends = () if is_call(call, "assert") else (terminate(words),)
         yield WhenChain((Happening(flag > 0.5, ends, words, failure="" if ends else words),))
 

@@ -58,9 +58,9 @@ def pulses(functions: ca.SX, begin: float, end: float, longest: float | None = N
         fine = max(fine, min(int(np.ceil((end - begin) / longest / COARSE)), MOST // COARSE))
     t = np.linspace(begin, end, fine * COARSE + 1)
     values = _without_jumps(ca.vertcat(*moving), t)
-    whole = np.nanmax(values, axis=1) - np.nanmin(values, axis=1)
+    whole = np.fmax.reduce(values, axis=1) - np.fmin.reduce(values, axis=1)  # passes over what is no number
     parts = np.stack([values[:, k : k + fine * COARSE : fine] for k in range(fine)] + [values[:, fine::fine]])
-    changes = np.nanmax(parts, axis=0) - np.nanmin(parts, axis=0)  # (functions, COARSE)
+    changes = np.fmax.reduce(parts, axis=0) - np.fmin.reduce(parts, axis=0)  # (functions, COARSE)
     rests = changes <= AT_REST * whole[:, None]
     long = np.array([np.convolve(r, np.ones(RESTING), "valid").max() >= RESTING for r in rests])
     some = long & (whole > 0)
