@@ -26,7 +26,7 @@ def instants(test: tree.Expression) -> tuple[tree.Expression, ...]:
 
 
 def instant_and_rest(test: tree.Expression) -> tuple[tree.Expression, tree.Expression | None]:
-    """A condition in two parts: `sample(...)` or `edge(...)`, and the rest, joined by `and`; without a call the whole, and None."""
+    """A condition in two parts: `sample(...)` or `edge(...)`, and the rest, joined by `and`; else the whole and None."""
     if isinstance(test, tree.Binary) and test.operator == "and":
         for one, other in ((test.left, test.right), (test.right, test.left)):
             if is_call(one, "sample") or is_call(one, "edge"):
