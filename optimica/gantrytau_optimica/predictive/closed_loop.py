@@ -10,7 +10,7 @@ from gantrytau import ModelError, Result
 from gantrytau.border.checks import number
 from gantrytau.border.refusal import Given
 from gantrytau.describing.record import Record
-from gantrytau_optimica.predictive.plan import StepTimes
+from gantrytau_optimica.predictive.plan import PlannedMotion, StepTimes, motion_result
 from gantrytau_optimica.predictive.stages import HorizonStages
 
 PARTS = 4  # steps of the plant in a period
@@ -49,7 +49,7 @@ class ClosedLoop(Record):
 
 def closed_loop(
     mpc: Any,
-    plant: "tuple[Any, HorizonStages]",
+    plant: tuple[Any, HorizonStages],
     stop: float,
     start: Mapping[str, Any],
     noise: Mapping[str, float],
@@ -80,9 +80,9 @@ def closed_loop(
         spread[mpc.states.index(name)] = number("run", f"noise[{name}]", value, least=0.0)
     random = np.random.default_rng(seed)
     guessed = [s.guess(np.zeros(1))[0] for s in (*stages.phase.states, *stages.phase.algebraics)]
-    each = stages.nx + stages.nz
-    w = np.tile(np.array(guessed, dtype=float) / stages.size_w[:each], 2)
-    x = mpc.scaled_state(dict(zip(mpc.states, guessed, strict=False)) | dict(start))
+    w = np.tile(np.array(guessed, dtype=float), 2) / stages.size_w
+    # the plant may have other sizes than the controller: between them go numbers in their units
+    x = mpc.whole_state(dict(zip(mpc.states, guessed, strict=False)) | dict(start)) / stages.sizes_x
     w[: stages.nx] = w[stages.last] = x
     states, unknowns, inputs, statuses, cost = [x], [], [], [], 0.0
     waiting = mpc.held
@@ -92,8 +92,8 @@ def closed_loop(
         given = mpc.step(dict(zip(mpc.states, measured.tolist(), strict=True)), t)
         statuses.append(mpc.status)
         mpc.prepare()
-        u = np.array(list(given.values())) / stages.sizes_u
-        u, waiting = (waiting, u) if mpc.delay else (u, u)
+        now, waiting = (waiting, given) if mpc.delay else (given, given)
+        u = np.array(list(now.values())) / stages.sizes_u
         for part in range(PARTS):
             at = t + part * stages.step
             w = stages.moved(x, w, u, at)
@@ -102,7 +102,6 @@ def closed_loop(
         states.append(x)
         unknowns.append(w)
         inputs.append(u)
-    found = mpc.result(
-        0.0, np.array(states), np.array(unknowns), np.array(inputs), f"{mpc.name}, closed loop", built
-    )
+    motion = PlannedMotion(np.array(states), np.array(unknowns), np.array(inputs), 0.0)
+    found = motion_result(built, stages, motion, mpc.period, f"{mpc.name}, closed loop")
     return ClosedLoop(found, tuple(statuses), mpc.timing, cost)

@@ -5,19 +5,23 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-import casadi as ca
 import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.border.checks import array, instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
-from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
-from gantrytau_optimica.predictive.plan import PlannedMotion, StepTimes, first_plan, guessed_plan
+from gantrytau_optimica.predictive.plan import (
+    PlannedMotion,
+    StepTimes,
+    first_plan,
+    guessed_plan,
+    motion_result,
+)
 from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
 from gantrytau_optimica.problem.optimization import Optimization
@@ -79,7 +83,7 @@ class Mpc:
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
         finite = np.isfinite(self._stages.rows)
         self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
-        self._terminal = Terminal(self._stages, self.elements * self.period)
+        self._terminal = Terminal(self._stages)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
@@ -115,7 +119,7 @@ class Mpc:
         """All variables of the model over the horizon as planned at the last step, inputs as they are held."""
         if self._plan is None:
             raise ModelError("there is no plan before the first step", place=self.name)
-        return self.result(self._plan.t, self._plan.x, self._plan.w, self._plan.u, f"{self.name}, planned")
+        return motion_result(self.built, self._stages, self._plan, self.period, f"{self.name}, planned")
 
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
@@ -145,7 +149,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
-        return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
+        return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
         """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
@@ -183,29 +187,6 @@ class Mpc:
         self._plan = self._prepared = None
         self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
 
-    def result(
-        self, t: float, x: np.ndarray, w: np.ndarray, u: np.ndarray, title: str, of: Any = None
-    ) -> Result:
-        """All variables of the model over stages from t on; x (N + 1, nx), w (N, nw), u (N, nu), scaled."""
-        stages, built = self._stages, of or self.built
-        names = list(built.read.dae.variables)
-        each = stages.nx + stages.nz
-        last = w[:, each:] * stages.size_w[:each]
-        z = np.vstack([w[:1, stages.nx : each] * stages.sizes_z, last[:, stages.nx :]])
-        signals = np.hstack([x * stages.sizes_x, z, np.vstack([u, u[-1:]]) * stages.sizes_u])
-        times = t + self.period * np.arange(len(x))
-        courses = [course.value(times) for course in stages.phase.courses]
-        (phase,) = built.problem.phases
-        own = [ca.vertcat(*(s.symbol for s in phase.signals)), built.problem.time]
-        own.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
-        named = ca.Function("variables", own, [ca.densify(built.expressed(names))])
-        values = np.asarray(
-            named(signals.T, times[None, :], np.array(courses).reshape(len(courses), times.size))
-        )
-        units, words = labels(built.read.dae)
-        own: Any = dict(units=units, descriptions=words, title=title, held=self.inputs)
-        return Result(times, dict(zip(names, values, strict=True)), **own)
-
     def run(
         self,
         plant: Optimization | type[Optimization] | None = None,
@@ -231,13 +212,13 @@ class Mpc:
         return closed_loop(self, other, stop, start or {}, noise or {}, seed)
 
     @property
-    def held(self) -> np.ndarray:
-        """The inputs that are applied now, scaled."""
-        return self._applied
+    def held(self) -> dict[str, float]:
+        """The inputs that are applied now, by name."""
+        return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
 
-    def scaled_state(self, values: Mapping[str, Any]) -> np.ndarray:
-        """A whole state by names, scaled; errors of `step`."""
-        return self._state(values)[0]
+    def whole_state(self, values: Mapping[str, Any]) -> np.ndarray:
+        """All states in their units, in the order of `states`; errors of `step`."""
+        return self._state(values)[0] * self._stages.sizes_x
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""

@@ -5,11 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from gantrytau import Result
 from gantrytau.describing.record import Record
+from gantrytau.simulation.to_result import labels
 from gantrytau_optimica.answers.answer import Answer
+from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.predictive.horizon_qp import Found
 from gantrytau_optimica.predictive.stages import NODES, HorizonStages, Linear
@@ -101,3 +104,26 @@ def guessed_plan(
         for k, signal in enumerate((*phase.states, *phase.algebraics)):
             w[:, i * each + k] = row(signal, times[:-1] + place * stages.step, w[:, i * each + k])
     return replace(plan, x=x, w=w, u=np.clip(u, stages.lower_u, stages.upper_u))
+
+
+def motion_result(
+    built: Built, stages: HorizonStages, motion: PlannedMotion, period: float, title: str
+) -> Result:
+    """All variables of a model at the samples of a motion, its inputs held.
+
+    Algebraic variables are those at the end of the period before, with its inputs.
+    """
+    names, each = list(built.read.dae.variables), stages.nx + stages.nz
+    last = motion.w[:, each:] * stages.size_w[:each]
+    z = np.vstack([motion.w[:1, stages.nx : each] * stages.sizes_z, last[:, stages.nx :]])
+    u = np.vstack([motion.u, motion.u[-1:]]) * stages.sizes_u
+    signals = np.hstack([motion.x * stages.sizes_x, z, u])
+    times = motion.t + period * np.arange(len(motion.x))
+    phase = stages.phase
+    symbols = [ca.vertcat(*(s.symbol for s in phase.signals)), stages.problem.time]
+    symbols.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
+    named = ca.Function("variables", symbols, [ca.densify(built.expressed(names))])
+    values = np.asarray(named(signals.T, times[None, :], stages.course_values(times)))
+    units, words = labels(built.read.dae)
+    own: Any = dict(units=units, descriptions=words, title=title, held=[s.name for s in phase.inputs])
+    return Result(times, dict(zip(names, values, strict=True)), **own)

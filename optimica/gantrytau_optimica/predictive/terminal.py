@@ -19,40 +19,31 @@ SETTLED = 1e-10
 class Terminal:
     """The objective of values at the end, `objective()` of `final(...)`, as a part of the last stage."""
 
-    def __init__(self, stages: HorizonStages, horizon: float):
+    def __init__(self, stages: HorizonStages):
         problem, phase = stages.problem, stages.phase
         ends = [p for p in phase.points if isinstance(p.time, str) and p.time == "final"]
         known = {e.element_hash() for p in ends for e in p.symbol.elements()}
-        for what, expression in (
-            ("the objective", problem.objective),
-            *((f"`{c.name}`", c.expression) for c in problem.boundary),
-        ):
-            leaves = ca.symvar(expression)
-            if what != "the objective" and all(leaf.element_hash() not in known for leaf in leaves):
-                continue  # a condition on the begin: the measurement takes its place
-            if any(leaf.element_hash() not in known for leaf in leaves):
+        first = [p for p in phase.points if isinstance(p.time, str) and p.time == "initial"]
+        measured = {e.element_hash() for p in first for e in p.symbol.elements()}
+        for limit in problem.boundary:
+            if any(leaf.element_hash() not in measured for leaf in ca.symvar(limit.expression)):
                 raise ModelError(
-                    f"{what} holds values at other times than the end, expected final(...) alone: a receding horizon knows "
-                    "its begin by measurement, and has no fixed times between",
+                    f"`{limit.name}` is a condition on the end or on a time between, expected a cost of the end: write "
+                    "objective(), as 100 * final(...)**2, or take terminal='lqr'",
                     place=problem.name,
                 )
+        if any(leaf.element_hash() not in known for leaf in ca.symvar(problem.objective)):
+            raise ModelError(
+                "the objective holds values at other times than the end, expected final(...) alone: a receding horizon "
+                "knows its begin by measurement, and has no fixed times between",
+                place=problem.name,
+            )
         y, t, courses = stages.symbols
         old = ca.vertcat(ca.SX(0, 1), *(p.symbol for p in ends))
         new = stages.at_point(ca.vertcat(ca.SX(0, 1), *(p.expression for p in ends)))
         cost = ca.substitute(problem.objective, old, new) if ends else ca.SX(0.0)
         self._there = not ca.SX(cost).is_constant()
-        self.stages, self.horizon = stages, horizon
-        self.conditions = [
-            (c.name, ca.substitute(c.expression, old, new) / c.size, c.lower / c.size, c.upper / c.size)
-            for c in problem.boundary
-            if any(leaf.element_hash() in known for leaf in ca.symvar(c.expression))
-        ]
-        if self.conditions:
-            raise ModelError(
-                f"`{self.conditions[0][0]}` is a condition on the end, expected a cost there: write it as objective(), "
-                "100 * final(...)**2, or take terminal='lqr'",
-                place=problem.name,
-            )
+        self.stages = stages
         if self._there:
             hessian, gradient = ca.hessian(cost, y)
             self._function = ca.Function("end", [y, t, courses], [ca.densify(gradient), ca.densify(hessian)])

@@ -7,7 +7,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, between, cos, der, sin
 from gantrytau_models import DeltaRobot
-from gantrytau_optimica import Free, Mpc, Optimization, final, initial, optimize
+from gantrytau_optimica import Free, Mpc, Optimization, at, final, initial, optimize
 
 
 class Cart(Model):
@@ -112,6 +112,16 @@ def test_a_plant_with_other_parameters_and_noise_is_held_within_the_limits_of_in
     assert np.abs(loop["pole.th"][-20:]).max() < 0.1
 
 
+def test_a_plant_of_other_sizes_moves_the_same():
+    mpc = Mpc(Rest, period=0.05, elements=20)
+    own, other = (
+        mpc.run(stop=1.0),
+        mpc.run(Rest(cart=dict(x=dict(nominal=50.0), u=dict(nominal=7.0))), stop=1.0),
+    )
+    assert other.cost == pytest.approx(own.cost, rel=1e-9)
+    np.testing.assert_allclose(other["cart.u"], own["cart.u"], atol=1e-7)
+
+
 def test_what_is_measured_as_nothing_is_foretold(upright):
     upright.reset()
     state = {"pole.p": 0.3, "pole.th": 0.2, "pole.v": 0.0, "pole.w": 0.0}
@@ -174,11 +184,17 @@ class EndsThere(Rest):
         yield final(self.cart.x) == 0
 
 
+class PassesThere(Rest):
+    def constraints(self):
+        yield at(0.5, self.cart.x) == 0
+
+
 @pytest.mark.parametrize(
     ("problem", "keywords", "told"),
     [
+        (PassesThere, {}, "is a condition on the end or on a time between"),
         (FreeEnd, {}, "final_time is free, expected a number: a receding horizon has a fixed length"),
-        (EndsThere, {}, "is a condition on the end, expected a cost there"),
+        (EndsThere, {}, "is a condition on the end or on a time between, expected a cost of the end"),
         (Rest, {"period": 0.0}, "period"),
         (Upright, {"hard": ["pole.p"]}, "expected some of -2 <= pole.p <= 2"),
         (Rest, {"terminal": "lq"}, "terminal"),
