@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import casadi as ca
@@ -20,7 +20,7 @@ from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
 from gantrytau.modelica.overloaded.operators import function_for
-from gantrytau.modelica.references import Members
+from gantrytau.modelica.references import Members, holding, references
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -207,6 +207,8 @@ def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
         return then
     if then is None or otherwise is None:
         return None  # not yet known in one branch: told where it is asked for
+    if isinstance(then, np.ndarray) and np.shape(then) == np.shape(otherwise):
+        return np.frompyfunc(partial(_chosen, test, name=name), 2, 1)(then, otherwise)
     if isinstance(then, RecordValue):
         each = {n: _chosen(test, one, otherwise[n], n) for n, one in then.items()}
         return RecordValue(each, then.scope)
@@ -274,9 +276,12 @@ def called_class(
     arguments: Sequence[Any],
     named: Mapping[str, Any],
     beyond: Surroundings,
-    constants: Members,
+    known: tuple[Members, Members | None],
 ) -> Any:
-    """The value of a function, several as a tuple, or of the constructor of a record."""
+    """The value of a function, several as a tuple, or of the constructor of a record.
+
+    known: the constants of its package, and the instance of whose members its modifications speak.
+    """
     definition = scope.definition
     if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
         scope = made
@@ -296,14 +301,15 @@ def called_class(
         longer = {n for n, one in given.items() if _is_longer(inputs[n], one)}
         count = range(len(given[mapped]))
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
-        each = [called_class(scope, (), one, beyond, constants) for one in all_given]
+        each = [called_class(scope, (), one, beyond, known) for one in all_given]
         return values.array(each)
     if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
+    constants, holder = known
     run = Execution(Interpreter(scope, constants, beyond), {})
     for name, element in (scope.elements if external is None and not record else inputs).items():
         run.declare(
-            name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
+            name, element, given[name] if name in given else _initial(element, run, holder, name in inputs)
         )
     if record:
         return RecordValue(run.known, scope)
@@ -357,8 +363,13 @@ def _is_longer(element: Element, value: Any) -> bool:
 
 
 def _is_array_type(element: Element) -> bool:
-    body = element.scope.find_class(element.clause.type, element.clause.at).definition.body
-    return isinstance(body, tree.ShortClass) and bool(body.subscripts)
+    here: ClassScope | None = element.scope.find_class(element.clause.type, element.clause.at)
+    while here is not None and here.is_primitive:
+        body = here.definition.body
+        if isinstance(body, tree.ShortClass) and body.subscripts:
+            return True
+        here = here.bases[0][0] if here.bases else None
+    return False
 
 
 def _given(
@@ -376,11 +387,14 @@ def _given(
     return found
 
 
-def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:
+def _initial(element: Element, run: Execution, holder: Members | None, needed: bool) -> Any:
     """The value of what a function declares, before its algorithm; None, or an array of None, where it has none."""
     reader = replace(run.reader, scope=element.scope, local={**run.reader.local, **run.known})
-    said = element.modifier
+    said, name = element.modifier, element.declaration.name
     if said.value is not None:
+        holder = None if said.scope is element.scope else holding(holder, references(said.value))
+        if holder is not None:
+            return Interpreter(said.scope, holder, reader.library).value(said.value)
         return replace(reader, scope=said.scope).value(said.value)
     if needed:
         raise ModelError(f"found no value for '{name}' of {run.reader.scope.name}, expected one")

@@ -34,14 +34,16 @@ from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import StatementSection
+from gantrytau.modelica.elaboration.scopes import ClassScope, StatementSection
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
+from gantrytau.modelica.overdetermined.records import closing
 from gantrytau.modelica.references import dotted, nodes_of
 
 TAKEN = "a name that is taken, expected another name"
@@ -103,6 +105,17 @@ class ModelicaModel(TextClass, Model):
 
 class ModelicaConnector(TextClass, Connector):
     """A connector of Modelica text."""
+
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
+        """Residuals of a connection that closes a loop."""
+
+        def residual(structure: Structure, one: Any, another: Any) -> Any:
+            function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
+            return to_casadi(
+                structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            )
+
+        yield from closing(self, other, residual)
 
 
 def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,8 +14,9 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+from gantrytau.modelica.overdetermined.spanning import answered, is_operator
 from gantrytau.modelica.overloaded.operators import operator_record, overloaded
-from gantrytau.modelica.references import Members, dotted
+from gantrytau.modelica.references import Members, called_function, component_of, dotted, function_name
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -27,8 +28,17 @@ class Surroundings(Protocol):
         """The constants of a package."""
         ...
 
-    def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
-        """The value of a function, or of the constructor of a record; several results as a tuple."""
+    def call(
+        self,
+        scope: ClassScope,
+        arguments: Sequence[Any],
+        named: Mapping[str, Any],
+        holder: Members | None = None,
+    ) -> Any:
+        """The value of a function, or of the constructor of a record; several results as a tuple.
+
+        holder: the instance of whose members modifications of the function speak.
+        """
 
 
 def changed(new: Any, old: Any) -> Any:
@@ -307,7 +317,9 @@ class Interpreter:
         return places if isinstance(found, np.ndarray) else places[0]
 
     def _call(self, e: tree.Call) -> Any:
-        name = ".".join(part for part, _ in e.function.parts)
+        name = function_name(e)
+        if is_operator(e):
+            return answered(e, self)
         quiet = name == "noEvent" or (name == "smooth" and self.value(e.arguments[0]) > 0)
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
@@ -330,11 +342,11 @@ class Interpreter:
             return self.members.next_sample(e) > 0.5
         if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
-        name, function = self.function(e)
+        name, function = called_function(e, self)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
         if function is not None:
-            return self.library.call(function, arguments, named)
+            return self.library.call(function, arguments, named, component_of(e, self) or self.members)
         if self.members.has(name):
             raise ModelError(
                 f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
@@ -354,15 +366,6 @@ class Interpreter:
         if asked == "pre":
             return old
         return new > old + 0.5 if asked == "edge" else changed(new, old)
-
-    def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
-        """The name of the function that is called, and its class; None for one of the language."""
-        name = ".".join(part for part, _ in e.function.parts)
-        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
-        found = None if name in ("der", "pure", "initial") else start.first(first.split(".")[0])
-        if "." not in first and (found is None or found.predefined):
-            return first, None
-        return name, self.scope.find_class(name, e.at)
 
     def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
         """The sizes of a component by its plain name, which say nothing of its value; None for all else."""

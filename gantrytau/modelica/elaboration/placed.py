@@ -16,6 +16,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import AbsentComponent, stated
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
@@ -31,6 +32,21 @@ class PlacedMembers:
 
     def has(self, name: str) -> bool:
         return name in self.names()
+
+    @property
+    def scope(self) -> ClassScope:
+        """Its class."""
+        if self.structure is None:
+            raise ModelError(
+                f"found a function of {type(self.instance).__name__}, expected one of Modelica text"
+            )
+        return self.structure.scope
+
+    @property
+    def around(self) -> "PlacedMembers | None":
+        """The instance of which it is a component."""
+        found = around(self.instance)
+        return found and PlacedMembers(found)
 
     @property
     def instance_name(self) -> str:

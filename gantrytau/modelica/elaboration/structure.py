@@ -17,6 +17,7 @@ from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
+from gantrytau.modelica.overdetermined.records import is_drawn
 from gantrytau.modelica.references import references
 from gantrytau.modelica.shaping import ask, ask_for_shapes
 
@@ -187,9 +188,7 @@ class ClassMember:
     name: str
     element: Element
     owner: Structure
-    first_sizes: list[int] = field(
-        default_factory=list
-    )  # on which its further ones depend, as in A[:, size(A, 1)]
+    first_sizes: list[int] = field(default_factory=list)  # for further ones, as in A[:, size(A, 1)]
 
     @cached_property
     def over(self) -> Modifier:
@@ -321,10 +320,11 @@ class ClassMember:
     def present(self) -> bool:
         """Whether its condition holds."""
         condition = self.element.declaration.condition
+        if self.primitive is None and is_drawn(self.plain_type):
+            return False
         if condition is None:
             return True
-        found = self.owner.interpreter(self.element.scope).value(condition)
-        if not isinstance(found, bool):
+        if not isinstance(found := self.owner.interpreter(self.element.scope).value(condition), bool):
             self.element.scope.refuse(condition.at, f"found {found!r} as a condition, expected true or false")
         return found
 
