@@ -52,7 +52,8 @@ class ClassScope:
     """A class as a place of names. around: the class in which it stands; replaced: its redeclared classes by name.
 
     more: what a folder adds to a package, as a function of a name; predefined: whether it is of the language, as Real;
-    limit: the class that it replaces, whose constraint modifies it where it has none of its own.
+    limit: the class that it replaces, whose constraint modifies it where it has none of its own; is_implied: whether it is
+    a package that a `within` names, but that is not read yet.
     """
 
     definition: tree.ClassDefinition
@@ -62,6 +63,7 @@ class ClassScope:
     more: Callable[[str], "ClassScope | None"] | None = None
     predefined: bool = False
     limit: "ClassScope | None" = None
+    is_implied: bool = False
     busy: bool = field(default=False, init=False)
 
     def refuse(self, at: int, words: str) -> NoReturn:
@@ -223,7 +225,8 @@ class ClassScope:
         for k, (base, modifier) in enumerate(self.bases):
             for name, element in base.elements.items():
                 over = modifier.inner.get(name)
-                element = element if over is None else _modified(element, over)
+                if over is not None:
+                    element = replace(element, modifier=merged(over, element.under(over)))
                 if name in found and found[name].scope.definition.name != HORIZON:
                     self._check_same(found[name], element)
                 found[name] = replace(element, protected=True) if any(hidden[k : k + 1]) else element
@@ -342,15 +345,18 @@ class ClassScope:
 
     def first(self, name: str, inherited: bool = True) -> "ClassScope | None":
         """The class that a simple name means here or further out."""
+        return next(self._meanings(name, inherited), None)
+
+    def _meanings(self, name: str, inherited: bool) -> Iterator["ClassScope"]:
+        """The classes of a simple name here and further out, the innermost first."""
         here: ClassScope | None = self
         while here is not None:
             found = here.own_class(name) or here.imported(name)
             if found is None and (inherited or here is not self) and not here.busy:
                 found = here.inherited_class(name)
             if found is not None:
-                return found
+                yield found
             here = here.root if "encapsulated" in here.definition.prefixes and here.around else here.around
-        return None
 
     def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
         """The component that a simple name means in a class around this one, and that class."""
@@ -367,24 +373,21 @@ class ClassScope:
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""
         start, name = (self.root, name[1:]) if name.startswith(".") else (self, name)
         first, *rest = [name] if self.source.base and self.first(name) else name.split(".")
-        found = start.first(first, inherited)
-        if found is None:
-            near = start.known_names()
-            hint = did_you_mean(first, near) if near else "."
-            self.refuse(
-                at,
-                f"found '{name}', expected the name of a class{hint} A library is given by its folder: "
-                "libraries=[...], --library",
-            )
-        for part in rest:
-            inner = found.inherited_class(part)
-            if inner is None:
-                self.refuse(
-                    at,
-                    f"found '{name}', but {found.name} has no class '{part}'{did_you_mean(part, found.names())}",
-                )
-            found = inner
-        return found
+        wrong: tuple[ClassScope, str] | None = None
+        for found in start._meanings(first, inherited):
+            left = rest  # where one is missing, a class further out is meant
+            while left and (inner := found.inherited_class(left[0])) is not None:
+                found, left = inner, left[1:]
+            if not left:
+                return found
+            wrong = wrong or (found, left[0])
+        if wrong is not None:
+            hint = did_you_mean(wrong[1], wrong[0].names())
+            words = f", but {wrong[0].name} has no class '{wrong[1]}'{hint}"
+        else:
+            hint = did_you_mean(first, near) if (near := start.known_names()) else "."
+            words = f", expected the name of a class{hint} A library is given by its folder: libraries=[...], --library"
+        return self.refuse(at, f"found '{name}'{words}")
 
     def known_names(self) -> list[str]:
         """Names of classes that can be said here, for messages."""
@@ -394,7 +397,3 @@ class ClassScope:
             found += [*here.classes]
             here = here.around
         return [*dict.fromkeys(found)]
-
-
-def _modified(element: Element, over: Modifier) -> Element:
-    return replace(element, modifier=merged(over, element.under(over)))
