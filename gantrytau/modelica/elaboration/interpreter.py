@@ -35,6 +35,18 @@ def changed(new: Any, old: Any) -> Any:
     return logic_or(new > old + 0.5, new < old - 0.5)
 
 
+def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
+    """The components of a list, or of lists in it, at the places of each dimension."""
+    if not places:
+        return components
+    place, *rest = places
+    return (
+        _elements(components[place], rest)
+        if isinstance(place, int)
+        else [_elements(components[k], rest) for k in place]
+    )
+
+
 def first_result(value: Any) -> Any:
     """The first of several results of a function, which is its value in an expression."""
     return next(iter(value), None) if isinstance(value, tuple) else value
@@ -244,19 +256,14 @@ class Interpreter:
         """The elements of an array or list that subscripts choose."""
         if not subscripts:
             return value
-        shape = (
-            (len(value),)
-            if isinstance(value, list)
-            else np.shape(value if isinstance(value, np.ndarray) else 0)
-        )
+        shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
         if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
-            (place,) = places
-            return value[place] if isinstance(place, int) else [value[k] for k in place]
+            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value

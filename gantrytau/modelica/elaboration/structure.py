@@ -16,7 +16,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
-from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
+from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.references import references
 from gantrytau.modelica.shaping import ask, ask_for_shapes
 
@@ -103,7 +103,7 @@ class Structure:
         if one.is_object and name not in self.objects:
             self.objects[name] = self.folded(one.full)
         if one.primitive is None:
-            return self.objects[name] if one.is_object else one.children if one.shape else one.children[0]
+            return self.objects[name] if one.is_object else in_rows(one.children, one.shape)
         if not one.is_parameter:
             raise ModelError(f"found the variable '{name}', expected what is known at translation")
         if one.full.value is None:
@@ -371,22 +371,28 @@ class ClassMember:
         if (meant := self._inner()) is not None:
             return meant.children
         clause, scope = self.clause
-        if len(self.shape) > 1:
-            scope.refuse(clause.at, f"found components of {len(self.shape)} dimensions, expected one")
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
             words = f"found a component of {kind.name}, which is partial, expected a class that extends it"
             scope.refuse(clause.at, words)
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        each = [self.full.of_element(k, count) for count in self.shape for k in range(count)]
-        said = each if self.shape else [self.full]
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
         around: Structure | None = self.owner
         while around is not None and around.scope.definition is not kind.definition:
             around = around.around
         if around is not None:
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
-        return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
+        return [
+            Structure(kind, one, self.owner.beyond, path, prefixes, self.owner)
+            for one in self.of_each(self.full)
+        ]
+
+    def of_each(self, said: Modifier) -> list[Modifier]:
+        """What a modification says of each of its elements, row after row."""
+        found = [said]
+        for size in self.shape:
+            found = [one.of_element(k, size) for one in found for k in range(size)]
+        return found
 
     def _inner(self) -> "ClassMember | None":
         """The component that an `outer` means."""
