@@ -31,10 +31,9 @@ from gantrytau.modelica.conditions import (
     targets,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import StatementSection
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
@@ -304,7 +303,7 @@ def _component(one: ClassMember) -> Any:
         return _opened(class_of(child), keywords_of(child, one.own, owner))
     found = Array(Declared, 0)
     found.shape = one.shape
-    for child, said in zip(one.children, one.of_each(one.own), strict=True):
+    for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
         same = found.elements and not child_differs(one.children[0], child)
         made: Any = found.component if same else class_of(child)
         found.component = found.component if found.elements else made

@@ -12,7 +12,8 @@ from gantrytau.language.functions import logic_or
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
 from gantrytau.modelica.references import Members, dotted
 

@@ -167,7 +167,7 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
         elif one.primitive is None:
             found[name] = [
                 keywords_of(x, each, structure)
-                for x, each in zip(one.children, one.of_each(inner), strict=True)
+                for x, each in zip(one.children, inner.of_elements(one.shape), strict=True)
             ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, without_optimica(one, inner, False), structure)

@@ -14,8 +14,8 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
-from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.references import references
 from gantrytau.modelica.shaping import ask, ask_for_shapes
@@ -182,14 +182,15 @@ class Structure:
 
 @dataclass(eq=False)
 class ClassMember:
-    """A component of an instance. kind: Real, Integer, Boolean, String, or an enumeration; "" for a class."""
+    """A component of an instance. kind: Real, Integer, Boolean, String, or an enumeration; "" for a class.
+
+    first_sizes: those on which its further ones depend, as in A[:, size(A, 1)].
+    """
 
     name: str
     element: Element
     owner: Structure
-    first_sizes: list[int] = field(
-        default_factory=list
-    )  # on which its further ones depend, as in A[:, size(A, 1)]
+    first_sizes: list[int] = field(default_factory=list)
 
     @cached_property
     def over(self) -> Modifier:
@@ -323,8 +324,7 @@ class ClassMember:
         condition = self.element.declaration.condition
         if condition is None:
             return True
-        found = self.owner.interpreter(self.element.scope).value(condition)
-        if not isinstance(found, bool):
+        if not isinstance(found := self.owner.interpreter(self.element.scope).value(condition), bool):
             self.element.scope.refuse(condition.at, f"found {found!r} as a condition, expected true or false")
         return found
 
@@ -373,8 +373,8 @@ class ClassMember:
         clause, scope = self.clause
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
-            words = f"found a component of {kind.name}, which is partial, expected a class that extends it"
-            scope.refuse(clause.at, words)
+            words = "which is partial, expected a class that extends it"
+            scope.refuse(clause.at, f"found a component of {kind.name}, {words}")
         path = f"{self.owner.path}.{self.name}".lstrip(".")
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
         around: Structure | None = self.owner
@@ -384,15 +384,8 @@ class ClassMember:
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [
             Structure(kind, one, self.owner.beyond, path, prefixes, self.owner)
-            for one in self.of_each(self.full)
+            for one in self.full.of_elements(self.shape)
         ]
-
-    def of_each(self, said: Modifier) -> list[Modifier]:
-        """What a modification says of each of its elements, row after row."""
-        found = [said]
-        for size in self.shape:
-            found = [one.of_element(k, size) for one in found for k in range(size)]
-        return found
 
     def _inner(self) -> "ClassMember | None":
         """The component that an `outer` means."""
