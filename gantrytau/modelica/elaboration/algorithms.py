@@ -14,7 +14,8 @@ from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
@@ -288,7 +289,7 @@ def called_class(
     if definition.kind == "record" and (
         made := function_for(scope, "constructor", (*arguments, *named.values()))
     ):
-        return called_class(made, arguments, named, beyond, constants)
+        return beyond.call(made, arguments, named)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")

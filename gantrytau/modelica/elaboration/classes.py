@@ -31,10 +31,10 @@ from gantrytau.modelica.conditions import (
     targets,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import ClassScope, StatementSection
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
@@ -315,16 +315,13 @@ def _component(one: ClassMember) -> Any:
     if not one.shape:
         (child,) = one.children
         return _opened(class_of(child), keywords_of(child, one.own, owner))
-    made: dict[int, type[Any]] = {}
-
-    def element(index: int) -> Any:
-        child = one.children[index]
-        made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
-
     found = Array(Declared, 0)
-    found.elements = [element(k) for k in range(one.shape[0])]
-    found.component = made[0] if made else Declared
+    found.shape = one.shape
+    for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
+        same = found.elements and not child_differs(one.children[0], child)
+        made: Any = found.component if same else class_of(child)
+        found.component = found.component if found.elements else made
+        found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 

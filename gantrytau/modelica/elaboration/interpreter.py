@@ -12,7 +12,8 @@ from gantrytau.language.functions import logic_or
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
 from gantrytau.modelica.overloaded.operators import operator_record, overloaded
@@ -44,6 +45,18 @@ class Surroundings(Protocol):
 def changed(new: Any, old: Any) -> Any:
     """Whether a Boolean, Integer or number of an enumeration is another one."""
     return logic_or(new > old + 0.5, new < old - 0.5)
+
+
+def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
+    """The components of a list, or of lists in it, at the places of each dimension."""
+    if not places:
+        return components
+    place, *rest = places
+    return (
+        _elements(components[place], rest)
+        if isinstance(place, int)
+        else [_elements(components[k], rest) for k in place]
+    )
 
 
 def first_result(value: Any) -> Any:
@@ -261,19 +274,14 @@ class Interpreter:
         """The elements of an array or list that subscripts choose."""
         if not subscripts:
             return value
-        shape = (
-            (len(value),)
-            if isinstance(value, list)
-            else np.shape(value if isinstance(value, np.ndarray) else 0)
-        )
+        shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
         if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
-            (place,) = places
-            return value[place] if isinstance(place, int) else [value[k] for k in place]
+            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value

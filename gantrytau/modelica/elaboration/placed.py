@@ -68,7 +68,8 @@ class PlacedMembers:
         if isinstance(found, ca.SX):
             return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
         if isinstance(found, tuple):
-            return [PlacedMembers(each) for each in found]
+            each = [PlacedMembers(each) for each in found]
+            return each if one is None else values.in_rows(each, one.shape)
         return PlacedMembers(found) if isinstance(found, Declared) else found
 
     def shape(self, name: str) -> tuple[int, ...] | None:

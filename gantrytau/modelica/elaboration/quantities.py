@@ -170,8 +170,8 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
             found[name] = [
-                keywords_of(x, inner.of_element(k, len(one.children)), structure)
-                for k, x in enumerate(one.children)
+                keywords_of(x, each, structure)
+                for x, each in zip(one.children, inner.of_elements(one.shape), strict=True)
             ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, without_optimica(one, inner, False), structure)

@@ -80,6 +80,21 @@ def from_casadi(symbol: ca.SX, shape: tuple[int, ...]) -> Any:
     return found
 
 
+def in_rows(items: Sequence[Any], shape: tuple[int, ...]) -> Any:
+    """Components that stand row after row as a list for each dimension; the one of a scalar."""
+    if not shape:
+        return items[0]
+    size = len(items) // shape[0] if shape[0] else 0
+    return [in_rows(items[k * size : (k + 1) * size], shape[1:]) for k in range(shape[0])]
+
+
+def all_sizes(value: Any) -> tuple[int, ...]:
+    """The sizes of an array, also one of components."""
+    if isinstance(value, list):
+        return (len(value), *(all_sizes(value[0]) if value else ()))
+    return np.shape(_shaped(value))
+
+
 def to_casadi(value: Any) -> Any:
     """A value as the language takes it: a number, or an expression of CasADi."""
     if not isinstance(value, np.ndarray):
@@ -269,7 +284,7 @@ def _reduced(function: Callable[[Any, Any], Any], start: Any) -> Callable[..., A
 
 
 def _size(value: Any, dimension: int | None = None) -> Any:
-    shape = (len(value),) if isinstance(value, list) else np.shape(_shaped(value))
+    shape = all_sizes(value)
     if dimension is None:
         return array(list(shape))
     if not 1 <= dimension <= len(shape):
