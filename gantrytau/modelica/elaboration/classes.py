@@ -26,6 +26,7 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    outer_name,
     sample_calls,
     sample_name,
     targets,
@@ -155,6 +156,8 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
+            if {"inner", "outer"} <= one.prefixes:
+                body[outer_name(name)] = Outer(Declared, name)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
