@@ -26,6 +26,7 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    outer_name,
     sample_calls,
     sample_name,
     targets,
@@ -91,7 +92,8 @@ class ModelicaModel(TextClass, Model):
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
-            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+            past = at_start((getattr(self, AT_START) == 0,))
+            yield WhenChain((replace(past, waits=True),))
         for name in _followed(self.structure):
             old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
             yield follows(reduce(getattr, name.split("."), self), old, turn)
@@ -167,6 +169,8 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
+            if {"inner", "outer"} <= one.prefixes:
+                body[outer_name(name)] = Outer(Declared, name)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
@@ -257,7 +261,8 @@ def _held(structure: Structure) -> Iterator[str]:
 def _asked_before(structure: Structure) -> set[str]:
     """Names of the Booleans whose values before an instant are asked for."""
     tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
-    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    running = (one for one in structure.scope.sections if one.kind != "initial equation")
+    calls = (one for section in running for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
     asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}

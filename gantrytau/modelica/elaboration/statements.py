@@ -82,11 +82,12 @@ def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iter
     """What makes a Boolean, or an Integer between limits, follow an expression that asks for values before."""
     if limits is None:
         right = values.condition(right)
-        yield Happening(right, (left == 1,), initially=True)
-        yield Happening(logic_not(right), (left == 0,), initially=True)
+        yield Happening(right, (left == 1,), initially=True, waits=True)
+        yield Happening(logic_not(right), (left == 0,), initially=True, waits=True)
         return
     for value in range(limits[0], limits[1] + 1):
-        yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
+        here = logic_and(right > value - 0.5, right < value + 0.5)
+        yield Happening(here, (left == value,), initially=True, waits=True)
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
