@@ -14,9 +14,10 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
-from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
-from gantrytau.modelica.overloaded.operators import operator_record, overloaded
+from gantrytau.modelica.records.operators import operated
+from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import Members, called_function, component_of, dotted, function_name
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
@@ -103,7 +104,7 @@ class Interpreter:
         except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
-    def _number(self, e: tree.Number) -> Any:
+    def _stated(self, e: tree.Number | tree.BooleanLiteral) -> Any:
         return e.value
 
     def _literal(self, e: tree.StringLiteral) -> str:
@@ -113,28 +114,19 @@ class Interpreter:
             else e.text
         )
 
-    def _boolean(self, e: tree.BooleanLiteral) -> bool:
-        return e.value
-
     def _mark(self, e: tree.Mark) -> Any:
         if e.word != "end" or self.end is None:
             raise ModelError(f"found '{e.word}', expected a value")
         return self.end
 
     def _unary(self, e: tree.Unary) -> Any:
-        operand = self.value(e.operand)
-        if operator_record(operand) is not None:
-            return overloaded(e.operator, [operand], self.library.call)
-        return values.unary(e.operator, operand)
+        return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
         left = self.value(e.left)
         if e.operator in ("and", "or") and left is (e.operator == "or"):
             return left  # the other side may have no value
-        right = self.value(e.right)
-        if operator_record(left) is not None or operator_record(right) is not None:
-            return overloaded(e.operator, [left, right], self.library.call)
-        return values.binary(e.operator, left, right)
+        return operated(e.operator, [left, self.value(e.right)], self.library.call)
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
@@ -389,9 +381,9 @@ class Interpreter:
 
 
 _EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
-    tree.Number: Interpreter._number,
+    tree.Number: Interpreter._stated,
     tree.StringLiteral: Interpreter._literal,
-    tree.BooleanLiteral: Interpreter._boolean,
+    tree.BooleanLiteral: Interpreter._stated,
     tree.Mark: Interpreter._mark,
     tree.Unary: Interpreter._unary,
     tree.Binary: Interpreter._binary,

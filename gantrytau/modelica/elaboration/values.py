@@ -16,6 +16,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.events import delay
 from gantrytau.language.functions import fmax, fmin, if_else, logic_and, logic_not, logic_or, mod
 from gantrytau.language.symbols import der, pre
+from gantrytau.modelica.records.record_values import RecordValue, is_plain, record_value
 
 
 class EnumerationValue(int):
@@ -31,27 +32,6 @@ class EnumerationValue(int):
 
     def __repr__(self) -> str:
         return f"{self.type}.{self.literal}"
-
-
-class RecordValue(dict[str, Any]):
-    """The members of a record by name; scope: the class of the record."""
-
-    def __init__(self, members: Mapping[str, Any], scope: Any = None):
-        super().__init__(members)
-        self.scope = scope
-
-
-def record_value(value: Any) -> RecordValue:
-    """A record, or a component that is one, as the values of its members."""
-    if isinstance(value, RecordValue):
-        return value
-    scope = getattr(getattr(value, "structure", None), "scope", None)
-    return RecordValue({n: value.member(n) for n in value.names()}, scope)
-
-
-def is_plain(value: Any) -> bool:
-    """Whether a value is a number, a text, an expression or an array of these."""
-    return isinstance(value, (bool, int, float, str, ca.SX, np.ndarray, np.number))
 
 
 def array(items: Sequence[Any]) -> Any:
