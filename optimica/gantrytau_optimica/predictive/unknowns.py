@@ -18,6 +18,7 @@ from gantrytau.border.refusal import Given, did_you_mean, meant
 from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
+from gantrytau_optimica.control.control_problem import Course
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
@@ -34,13 +35,12 @@ def with_unknowns(problem: Any, parameters: Iterable[str], disturbance: Iterable
     problem: an Optimization or a Model, class or instance; parameters, disturbance: names, vectors whole or by element.
     Raises ModelError for names that are none of these.
     """
-    added: list[str] = []
+    wanted, added = list(disturbance), []
 
     def change(flat: FlatModel) -> FlatModel:
-        added.extend(_elements(flat, disturbance, place))
+        added.extend(_elements(flat, wanted, place))
         return _disturbed(flat, added)
 
-    wanted = list(disturbance)
     read = read_problem(_as_problem(problem, place), change if wanted else None)
     read = _with_disturbed_outputs(read, added)
     held = [e for name in parameters for e in _adjustable(read, name, place)]
@@ -57,6 +57,21 @@ def with_unknowns(problem: Any, parameters: Iterable[str], disturbance: Iterable
         for n in built.problem.free
     )
     return replace(built, problem=replace(built.problem, free=free))
+
+
+def as_courses(built: Built, parameters: Iterable[str]) -> tuple[Built, dict[str, float]]:
+    """The problem with parameters and all disturbances as constant courses, and their values by name, which may change."""
+    problem = built.problem
+    (phase,) = problem.phases
+    named = {e for name in parameters for e in built.read.dae.expand(name)}
+    told = [n for n in problem.free if n.held or n.name in named]
+    values = {n.name: n.guess for n in told}
+    courses = [
+        Course(n.name, n.symbol, lambda times, name=n.name: np.full(times.shape, values[name])) for n in told
+    ]
+    phase = replace(phase, courses=(*phase.courses, *courses))
+    free = tuple(n for n in problem.free if n.name not in values)
+    return replace(built, problem=replace(problem, phases=(phase,), free=free)), values
 
 
 def named_values(
@@ -96,7 +111,7 @@ def _as_problem(problem: Any, place: str) -> Any:
 def _elements(flat: FlatModel, names: Iterable[str], place: str) -> list[str]:
     """Scalar inputs and variables by their names; ModelError for parameters and unknown names."""
     known = {e for v in flat.variables for e in v.elements}
-    found = [e for name in names for e in flat.expand(name)]
+    found = list(dict.fromkeys(e for name in names for e in flat.expand(name)))
     for name in found:
         if name not in known:
             words = "expected an input or a measured variable; a parameter belongs in parameters="

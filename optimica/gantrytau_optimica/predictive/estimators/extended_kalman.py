@@ -38,8 +38,8 @@ class ExtendedKalman(StateEstimator):
 
     def _correct(self, y: np.ndarray) -> EstimateStatus:
         one, t = self.observed, float(self._t or 0.0)
-        self._z = one.settled(self._x, self._z, self._u, t)
-        h, C, _ = one.output(self._x[None], self._z[None], self._u[None], np.array([t]))
+        self._z = one.shown.settled(self._x, self._z, self._u, t)
+        h, C, _ = one.shown.at(self._x[None], self._z[None], self._u[None], np.array([t]))
         self._x, self._P = corrected(self._x, self._P, y - h[0], C[0], one.r)
         return "estimated"
 

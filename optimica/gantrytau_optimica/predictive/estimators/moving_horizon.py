@@ -68,7 +68,7 @@ class MovingHorizon(StateEstimator):
     def _begin(self, u: np.ndarray, t: float) -> None:
         super()._begin(u, t)
         one, stages = self.observed, self.observed.stages
-        z = one.settled(one.x0, one.z0, u, t)
+        z = one.shown.settled(one.x0, one.z0, u, t)
         self._x, self._z, self._y = one.x0[None], z[None], np.full((1, len(one.outputs)), np.nan)
         self._w, self._held = np.zeros((0, stages.nw)), u[None]  # inputs before each node
         self._times = np.array([t])
@@ -104,7 +104,7 @@ class MovingHorizon(StateEstimator):
     def _taken(self, m: np.ndarray, P: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
         """Mean and covariance after sample k."""
         some, one = slice(k, k + 1), self.observed
-        h, C, _ = one.output(self._x[some], self._z[some], self._held[some], self._times[some])
+        h, C, _ = one.shown.at(self._x[some], self._z[some], self._held[some], self._times[some])
         return corrected(m, P, self._y[k] - h[0] - C[0] @ (m - self._x[k]), C[0], one.r)
 
     def _correct(self, y: np.ndarray) -> EstimateStatus:
@@ -121,7 +121,7 @@ class MovingHorizon(StateEstimator):
     def _iterated(self) -> float:
         """A step of Gauss-Newton's method; the largest change, NaN where the program has no solution."""
         one, stages, n = self.observed, self.observed.stages, len(self._w)
-        h, C, algebraic = one.output(self._x, self._z, self._held, self._times)
+        h, C, algebraic = one.shown.at(self._x, self._z, self._held, self._times)
         taken = np.isfinite(self._y)
         C = np.where(taken[..., None], C / one.r[:, None], 0.0)
         e = np.where(taken, (self._y - h) / one.r, 0.0)

@@ -62,8 +62,8 @@ def _along(observed: ObservedModel, apart: float) -> tuple[np.ndarray | None, np
     rows, moved = [], np.eye(stages.nx)
     try:
         for k in range(count):
-            z = observed.settled(x, z, u, t)
-            C = observed.output(x[None], z[None], u[None], np.array([t]))[1][0]
+            z = observed.shown.settled(x, z, u, t)
+            C = observed.shown.at(x[None], z[None], u[None], np.array([t]))[1][0]
             rows.append(C / observed.r[:, None] @ moved)
             u = low + random.uniform(0.0, 1.0, stages.nu) * (high - low) if apart else u
             w = stages.moved(x, np.tile(np.append(x, z), 2), u, t)

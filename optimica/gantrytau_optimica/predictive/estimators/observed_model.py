@@ -8,7 +8,6 @@ F is one stage of the horizon, as `Mpc` has it. Parameters and disturbances are 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -16,11 +15,11 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.border.checks import number
-from gantrytau.simulation.events.at_places import AtPlaces
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import FreeNumber, Signal
 from gantrytau_optimica.control.limits import signal_limits
-from gantrytau_optimica.predictive.stages import SETTLED, TURNS, HorizonStages
+from gantrytau_optimica.predictive.outputs import Outputs
+from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.unknowns import disturbance_of, named_values, with_unknowns
 
 
@@ -82,6 +81,8 @@ class ObservedModel:
                 raise ModelError(
                     f"{words}, expected {low * sizes[name]:g} to {high * sizes[name]:g}", place=place
                 )
+        added = [self._disturbance(name) for name in self.outputs]
+        self.shown = Outputs(built, stages, self.outputs, ca.vertcat(*added))
         self.z0 = np.array([s.guess(np.zeros(1))[0] for s in phase.algebraics]).reshape(-1) / stages.sizes_z
 
     def _deviations(
@@ -94,59 +95,12 @@ class ObservedModel:
             whole[name] = number(self.place, f"{argument}[{name}]", value, **limits)
         return named_values(self.flat, self.place, argument, whole, tuple(names))
 
-    @cached_property
-    def _output_point(self) -> AtPlaces:
-        """Residuals and outputs at one point, with their Jacobians by (x, z)."""
-        stages = self.stages
-        y, t, courses = stages.symbols
-        shifted = [
-            self.built.expressed([name])[0]
-            + next((s.symbol for s in stages.phase.states if s.name == disturbance_of(name)), ca.SX(0.0))
-            * (name not in self.built.read.dae.inputs)
-            for name in self.outputs
-        ]
-        out = stages.at_point(ca.vertcat(*shifted))
-        residuals = stages.equations[stages.nx :]
-        own = stages.nx + stages.nz
-        both = ca.vertcat(residuals, out)
-        return AtPlaces(
-            ca.Function(
-                "outputs", [y, t, courses], [ca.densify(both), ca.densify(ca.jacobian(both, y)[:, :own])]
-            )
-        )
-
-    def output(
-        self, x: np.ndarray, z: np.ndarray, u: np.ndarray, times: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Outputs (n, ny) and their Jacobian (n, ny, nx) at scaled nodes, algebraics eliminated; changes of these by
-        (1, x), (n, nz, 1 + nx).
-        """
-        nx, nz, n = self.stages.nx, self.stages.nz, len(x)
-        courses = self.stages.course_values(times).T
-        values, J = self._output_point(np.concatenate([x, z, u], axis=1), times, courses)
-        J = J.reshape(n, nx + nz, -1).swapaxes(1, 2)
-        h, C, change = values[:, nz:], J[:, nz:, :nx], np.zeros((n, nz, 1 + nx))
-        if nz:
-            right = np.concatenate([values[:, :nz, None], J[:, :nz, :nx]], axis=2)
-            change = -np.linalg.solve(J[:, :nz, nx:], right)
-            along = J[:, nz:, nx:] @ change
-            h, C = h + along[..., 0], C + along[..., 1:]
-        return h, C, change
-
-    def settled(self, x: np.ndarray, z: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
-        """The algebraics (nz,) at a node, by Newton's method from a guess; ModelError where there are none."""
-        for _ in range(TURNS if self.stages.nz else 0):
-            change = self.output(x[None], z[None], u[None], np.array([t]))[2][0, :, 0]
-            z = z + change
-            if not np.isfinite(change).all():
-                break
-            if np.abs(change).max() < SETTLED:
-                return z
-        if self.stages.nz:
-            raise ModelError(
-                f"the equations have no solution near the estimate at t = {t:g} s", place=self.place
-            )
-        return z
+    def _disturbance(self, name: str) -> ca.SX:
+        """What is added to an output."""
+        if name in self.built.read.dae.inputs:
+            return ca.SX(0.0)
+        own = disturbance_of(name)
+        return next((s.symbol for s in self.stages.phase.states if s.name == own), ca.SX(0.0))
 
     def in_units(self, x: np.ndarray) -> dict[str, float]:
         """A scaled state by names."""
