@@ -15,6 +15,7 @@ from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
     StepTimes,
@@ -47,6 +48,9 @@ class Mpc:
     until nothing changes. delay: periods from a measurement until its inputs are applied, 0 or 1; the state is foretold to
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
+    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
+    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
+    or [1, 1, 2, 4], the last one to the end.
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
     """
@@ -63,6 +67,9 @@ class Mpc:
         iterations: int | Literal["converged"] = 1,
         delay: int = 0,
         deadline: float | None = None,
+        rates: Mapping[str, Any] | None = None,
+        step_penalty: Mapping[str, float] | None = None,
+        blocks: int | Sequence[int] = 1,
         guess: Mapping[str, Any] | Result | Answer | None = None,
     ):
         self.period = number("Mpc", "period", period, unit="s", above=0.0)
@@ -82,7 +89,11 @@ class Mpc:
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
         finite = np.isfinite(self._stages.rows)
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
+        self._moves = moves = Moves(self._stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        nx = self._stages.nx + (self._stages.nu if moves.wanted else 0)
+        limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
+        soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
+        self._program = HorizonProgram(self.elements, nx, self._stages.nu, soft, finite, weight)
         self._terminal = Terminal(self._stages)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
@@ -137,6 +148,7 @@ class Mpc:
         kept = plan if before is None else before.shifted(t, self.period)
         self._plan = plan if solved else None if before is None else kept
         held = kept.u[0] if late or not solved else plan.u[0]
+        held = self._moves.reached(held, self._applied)
         self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
         self._missed += late
         wanting = self._converged and change >= STANDS
@@ -270,7 +282,13 @@ class Mpc:
             H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
             stages.lower_u - plan.u, stages.upper_u - plan.u,
         )  # fmt: skip
-        return self._program.solve(stage, P, p, x - plan.x[0])
+        first = x - plan.x[0]
+        if not self._moves.wanted:
+            return self._program.solve(stage, P, p, first)
+        stage, none = self._moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
+        P = np.pad(P, (0, stages.nu))
+        found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
+        return self._moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
