@@ -14,6 +14,12 @@ from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.horizon_checks import (
+    check_bounded,
+    check_plan,
+    doubt_deadline,
+    doubt_samples,
+)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
@@ -52,7 +58,8 @@ class Mpc:
     from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
     or [1, 1, 2, 4], the last one to the end.
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
-    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
+    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
+    without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """
 
     def __init__(
@@ -86,6 +93,8 @@ class Mpc:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages = _staged(problem, self.period)
         self.name = self.built.read.name
+        check_bounded(self._stages)
+        doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
         finite = np.isfinite(self._stages.rows)
@@ -161,6 +170,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
+        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
@@ -174,12 +184,16 @@ class Mpc:
             else:
                 linear = self._linear(plan)
             found = self._solved(plan, linear, x)
+            if first and found.unbounded:
+                check_plan(self._stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
             self.softened = self._passed(found)
             if change < STANDS:
                 break
+        if first:
+            check_plan(self._stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:

@@ -93,6 +93,7 @@ def test_a_plan_of_growing_blocks_costs_least_among_its_neighbours():
             assert cost(values + away * np.eye(4)[k]) > here
 
 
+@pytest.mark.filterwarnings("ignore:.*found a deadline")
 def test_rates_hold_in_the_loop_late_or_not():
     rates = {"cart.u": (-4.0, 2.0)}
     for deadline in (None, 1e-9):
