@@ -88,10 +88,10 @@ assert error.mean > 2e-3
 assert error.axes[0] < min(error.axes[1:])
 
 # %% [markdown]
-# The thesis has 1.7 mm, and prints no lens. With a distortion of 0.035 instead of 0.12 this gives 1.2 to 1.5 mm by the places
-# of the lines: a number that is fitted to the printed one, and explains it no better than another lens would. With 0.017 it
-# is 0.5 mm, as centres that are off make up for some of it, and 1.3 to 1.4 mm where the label is right about all else. What
-# is left of the image points does not tell: 0.1 pixel in each case.
+# The thesis has 1.7 mm, and no lens. With a distortion of 0.035 instead of 0.12 this gives 1.2 to 1.5 mm, by where the
+# lines lie: a number that is fitted to the printed one, and explains it no better than another lens would. With 0.017 it is
+# 0.5 mm, as centres that are off make up for some of it, and 1.3 to 1.4 mm where the label is right about all else. What is
+# left of the image points does not tell: 0.1 pixel in each case.
 #
 # ## What is known belongs into the fit
 #

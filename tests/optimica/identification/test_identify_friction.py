@@ -294,5 +294,5 @@ def test_figure_has_a_panel_for_each_actuator_and_one_of_weight(tmp_path):
     assert len(figure.axes) == 4
     assert (tmp_path / "friction.png").stat().st_size > 1000
     across = found.plot_places(Kinematics(ROBOT)).axes[0].lines[0]
-    y, z = np.unique(np.round(across.get_xydata(), 6), axis=0).T
+    y, z = np.unique(np.round(np.array(across.get_xydata()), 6), axis=0).T
     assert len(y) == len(z) == 2  # one place of y and z for each pose
