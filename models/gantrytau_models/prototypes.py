@@ -135,6 +135,7 @@ class _Robot(Record):
     )
     source: str
     assumed: tuple[str, ...] = ()  # what the source does not print for this robot
+    fitted: str = ""  # which numbers are fitted to printed results, and what that makes of these results
 
     def __post_init__(self):
         hold_numbers(self, self.name)
@@ -309,7 +310,8 @@ def _read(name: str) -> Prototype | RotatingPrototype:
         kind = FlexiblePrototype
     arms = [read_arm(name, i) for i in range(len(table["arms"]))]
     assumed = tuple(table.get("assumed", ()))
-    return _build(kind, name, name=name, arms=arms, source=table["source"], assumed=assumed, **others)
+    others |= dict(source=table["source"], assumed=assumed, fitted=table.get("fitted", ""))
+    return _build(kind, name, name=name, arms=arms, **others)
 
 
 def names() -> list[str]:
