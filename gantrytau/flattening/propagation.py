@@ -149,14 +149,16 @@ def defining(
             if symbol is not None and symbol.kind == "propagated" and not symbol.order:
                 lone.setdefault(symbol.name, []).append((one, other))
     names = {
-        p: [s.name() for n in propagated(c) for s in scalars(symbol_of(c, n))] for p, c in tree.nodes.items()
+        p: [(n, s.name()) for n in propagated(c) for s in scalars(symbol_of(c, n))]
+        for p, c in tree.nodes.items()
     }
-    open_names = {name for each in names.values() for name in each}
+    open_names = {name for each in names.values() for _, name in each}
     found: dict[str, tuple[Equation, ca.SX]] = {}
-    for path, edge, _ in tree.reached:
-        own = lone if edge is None or edge.branch is not None else {}
-        for name in names[path]:
-            known = (each for each in own.get(name, ()) if open_names.isdisjoint(leaf_names([each[1]])))
+    for path, edge, root in tree.reached:
+        given = _given(path, tree.nodes[path], edge, root, instance, tree)
+        for whole, name in names[path]:
+            own = () if whole in given else lone.get(name, ())
+            known = (each for each in own if open_names.isdisjoint(leaf_names([each[1]])))
             if (first := next(known, None)) is not None:
                 found[name] = first
             open_names.discard(name)
