@@ -26,6 +26,7 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    own_turn,
     sample_calls,
     sample_name,
     targets,
@@ -41,7 +42,7 @@ from gantrytau.modelica.elaboration.statements import (
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
-from gantrytau.modelica.references import dotted, nodes_of
+from gantrytau.modelica.references import dotted, nodes_of, whole_name
 
 TAKEN = "a name that is taken, expected another name"
 
@@ -91,7 +92,9 @@ class ModelicaModel(TextClass, Model):
             yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
         for name in _followed(self.structure):
             old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
-            yield follows(reduce(getattr, name.split("."), self), old, turn)
+            now: Any = reduce(getattr, name.split("."), cast(Any, self))
+            every = (one.elements() for one in (now, old, turn))
+            yield from map(follows, *every)
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
                 yield der(getattr(self, name)) == 0
@@ -158,11 +161,16 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
         start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
         body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
-    body["_followed"] = (*_followed(structure), *map(sample_name, guarded_samples(_whens(structure))))
+    guarded = map(sample_name, guarded_samples(_whens(structure)))
+    own = {n: tree.ComponentReference(0, ((n, ()),)) for n in _held_by_equations(structure)}
+    integers = (own_turn(n) for n, one in own.items() if structure.values_of(one) is None)
+    followed = _followed(structure)
+    body["_followed"] = tuple(dict.fromkeys((*followed, *integers, *guarded)))
     for name in body["_followed"]:
-        body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
-    for name in _followed(structure):
-        body[followed_name(BEHIND, name)] = Discrete(0, description=f"{name} before an instant")
+        words = f"parity of the changes of {name}"
+        body[followed_name(TURN, name)] = Discrete(0, shape=followed.get(name, ()), description=words)
+    for name, shape in followed.items():
+        body[followed_name(BEHIND, name)] = Discrete(0, shape=shape, description=f"{name} before an instant")
     taken = next((n for n in structure.members if isinstance(body.get(n), Discrete) and n not in held), None)
     if taken is not None:
         scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
@@ -225,8 +233,8 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
                     yield one, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
-def _held(structure: Structure) -> Iterator[str]:
-    """Names of what a `when` sets."""
+def _held_by_equations(structure: Structure) -> Iterator[str]:
+    """Names of Booleans and Integers whose equations ask for values before."""
     asked = _asked_before(structure)
     for section in _all_sections(structure):
         for item in section.items if section.kind == "equation" else ():
@@ -235,6 +243,11 @@ def _held(structure: Structure) -> Iterator[str]:
                 remembers(item, structure) or left.parts[0][0] in asked
             ):
                 yield left.parts[0][0]
+
+
+def _held(structure: Structure) -> Iterator[str]:
+    """Names of what a `when`, or an equation that asks for values before, sets."""
+    yield from _held_by_equations(structure)
     for item in _whens(structure):
         for _, items in item.branches:
             yield from targets(items)
@@ -253,23 +266,23 @@ def _asked_before(structure: Structure) -> set[str]:
     }
 
 
-def _followed(structure: Structure) -> list[str]:
-    """Names of the variables that need a Discrete with their value before an instant."""
+def _followed(structure: Structure) -> dict[str, tuple[int, ...]]:
+    """Names and sizes of the variables that need a Discrete with their value before an instant."""
     branches = [branch for item in _whens(structure) for branch in item.branches]
     changes = {name for test, items in branches for name in changed_in(test, items)}
     alone = {id(one) for test, _ in branches for one in instants(test)}
     said = [one.element.declaration.modification for one in structure.members.values()]
-    found: list[str] = []
+    found: dict[str, tuple[int, ...]] = {}
     for call in calls_before([said, [section.items for section in structure.scope.sections]]):
-        asked, name = call.function.parts[0][0], dotted(call.arguments[0])
+        asked, name = call.function.parts[0][0], whole_name(call.arguments[0])
         one = structure.leaf(cast(tree.ComponentReference, call.arguments[0]))
-        if one is None or one.is_parameter or one.shape or (asked == "edge" and id(call) in alone):
+        if one is None or one.is_parameter or 0 in one.shape or (asked == "edge" and id(call) in alone):
             continue
         number = one.kind == "Integer" or one.literals is not None
-        beside = asked != "pre" or name in changes or (number and name not in _held(structure))
+        beside = asked != "pre" or name in changes or ((number or one.shape) and name not in _held(structure))
         if beside and (number or one.kind == "Boolean"):
-            found.append(name)
-    return [*dict.fromkeys(found)]
+            found[name] = one.shape
+    return found
 
 
 def _all_sections(structure: Structure) -> Iterator[StatementSection]:

@@ -2,20 +2,20 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean, in_words
 from gantrytau.language.functions import logic_or
-from gantrytau.language.symbols import pre, time
+from gantrytau.language.symbols import time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
-from gantrytau.modelica.references import Members, dotted
+from gantrytau.modelica.references import Members, whole_name
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -260,7 +260,7 @@ class Interpreter:
         shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
-        if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
+        if isinstance(value, np.ndarray) and value.size and any(map(self.varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
@@ -269,7 +269,7 @@ class Interpreter:
             value = np.take(value, places[axis], axis=axis)
         return value
 
-    def _varies(self, subscript: tree.Expression, size: int) -> bool:
+    def varies(self, subscript: tree.Expression, size: int) -> bool:
         """Whether a subscript is known while a model runs only."""
         if isinstance(subscript, (tree.Mark, tree.Number)):
             return False
@@ -279,7 +279,7 @@ class Interpreter:
     def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
         """The elements of an array at places of which some vary; beyond the array no number, which ends a run."""
         (first, *rest), size = subscripts, len(value)
-        if not self._varies(first, size):
+        if not self.varies(first, size):
             chosen = self.places(first, size)
             each = [self.indexed(value[k], rest) for k in ([chosen] if isinstance(chosen, int) else chosen)]
             return each[0] if isinstance(chosen, int) else values.array(each)
@@ -329,7 +329,7 @@ class Interpreter:
             return found
         if name == "initial":
             return self.members.next_sample(e) > 0.5
-        if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
+        if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = self.function(e)
         arguments = [inner.value(one) for one in e.arguments]
@@ -344,17 +344,19 @@ class Interpreter:
 
     def _before(self, asked: str, e: tree.Expression) -> Any:
         """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""
-        name = dotted(e)
+        name = whole_name(e)
         inside = self.following is not None and name in self.following
         old = self.members.before(name, "edge" if inside else asked) if name else None
         if self.settled and (asked == "pre" or old is None):
             return self.value(e) if asked == "pre" else False
         if old is None:
             return None
-        old, new = old if self.following is None else pre(old), self.value(e)
+        old = self.indexed(old, cast(tree.ComponentReference, e).parts[-1][1])
+        old, new = old if self.following is None else values.called("pre", [old], {}), self.value(e)
         if asked == "pre":
             return old
-        return new > old + 0.5 if asked == "edge" else changed(new, old)
+        test = changed if asked == "change" else lambda a, b: a > b + 0.5
+        return np.frompyfunc(test, 2, 1)(new, old) if isinstance(new, np.ndarray) else test(new, old)
 
     def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
         """The name of the function that is called, and its class; None for one of the language."""

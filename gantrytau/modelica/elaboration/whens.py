@@ -6,6 +6,7 @@ from functools import reduce
 from typing import Any, cast
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
@@ -85,14 +86,19 @@ def _happenings(
             yield at_start(actions)
             continue
         edge = cast(tree.Call, one).arguments[0] if is_call(one, "edge") else one
-        found = values.condition(_stays(edge, reader))
+        found = _stays(edge, reader)
+        if isinstance(found, np.ndarray):  # a vector of conditions
+            each = (Happening(values.condition(test), actions) for test in found)
+            yield from each
+            continue
+        found = values.condition(found)
         if isinstance(found, ca.SX):
             refuse_change(found)
         elif found is False:
             found = time < -1e30  # never
         sampled = any(sample_calls(one))
-        turns = map(reader.members.turn, sorted(set(changed_in(one, items))))
-        for each in _both(found, [turn for turn in turns if turn is not None]):
+        turns = map(reader.members.turn, sorted(set(changed_in(edge, items))))
+        for each in _both(found, [one for turn in turns if turn is not None for one in turn.elements()]):
             yield Happening(each, actions, "sample" if sampled else "", sampled)
 
 
@@ -137,9 +143,9 @@ def _by_variable(actions: Iterable[Any]) -> dict[tuple[str, type], tuple[Any, An
     return found
 
 
-def follows(variable: ca.SX, old: ca.SX, turn: ca.SX) -> WhenChain:
-    """What makes a Discrete follow a variable one round later; turn: the parity of its changes."""
-    change, act = changed(variable, old), (old == variable, turn == 1 - pre(turn))
+def follows(value: ca.SX, held: ca.SX, turn: ca.SX, then: ca.SX | None = None) -> WhenChain:
+    """What makes a Discrete follow a value one round later; turn: the parity of its changes; then: that of an action."""
+    change, act = changed(value, held), (held == (value if then is None else then), turn == 1 - pre(turn))
     return WhenChain(tuple(Happening(test, act, initially=True) for test in _both(change, [turn])))
 
 

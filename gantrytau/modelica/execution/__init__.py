@@ -1,0 +1,1 @@
+"""What statements make of values that vary."""
