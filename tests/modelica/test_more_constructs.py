@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, SolveError, load_modelica, simulate
+from gantrytau import ModelError, SolveError, load_modelica, simulate, translate
 
 GRID = """package Grids
   connector Pin
@@ -180,6 +180,18 @@ INSTANTS = """package Instants
     table := {{1, 2}, {3, 4}};
     table[place, :] := {time, 5};
   end Buffer;
+  model Sampled
+    Integer n(start = 0), m(start = 0);
+    Real last(start = -1);
+  equation
+    when sample(-0.3, 1) then
+      n = pre(n) + 1;
+      last = time;
+    end when;
+    when sample(2, 0.5) then
+      m = pre(m) + 1;
+    end when;
+  end Sampled;
 end Instants;
 """
 
@@ -205,3 +217,12 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
     assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
     with pytest.raises(SolveError):
         simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants):
+    found = [simulate(instants["Instants.Sampled"](), start=t, stop=t + 1.5) for t in (0.0, 0.7, 2.1)]
+    assert [(one.final("n"), round(one.final("last"), 9), one.final("m")) for one in found] == [
+        (1, 0.7, 0), (2, 1.7, 1), (1, 2.7, 3),
+    ]  # fmt: skip
+    text = translate(instants["Instants.Sampled"](), events=True).equations("base-modelica")
+    assert all(words in text for words in ("sample(-0.3, 1)", "sample(2, 0.5)"))

@@ -158,9 +158,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             body[name] = _component(one)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
-        known = structure.is_fixed(call.arguments[0])  # else it is set at the start
-        start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
-        body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
+        body[sample_name(call)] = Discrete(1e60, unit="s", description="next instant of sample()")
     guarded = map(sample_name, guarded_samples(_whens(structure)))
     own = {n: tree.ComponentReference(0, ((n, ()),)) for n in _held_by_equations(structure)}
     integers = (own_turn(n) for n, one in own.items() if structure.values_of(one) is None)

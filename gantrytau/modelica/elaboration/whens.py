@@ -10,11 +10,10 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_and, logic_not, logic_or
+from gantrytau.language.functions import ceil, floor, if_else, logic_and, logic_not, logic_or
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
-    SAMPLE,
     Items,
     changed_in,
     checks_in,
@@ -41,9 +40,11 @@ def when_chains(
         passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
         action = instant == pre(instant) + passed * period
         advance = Happening(time >= instant, (action,), "sample", True)
-        first = at_start((instant == reader.value(call.arguments[0]),))
-        known = reader.members.is_fixed(call.arguments[0])
-        yield WhenChain((advance,) if known else (first, advance))
+        begin = reader.value(call.arguments[0])
+        late = if_else(
+            time > begin, ceil((time - begin) / period - ROUNDING), 0
+        )  # periods before the run begins
+        yield WhenChain((at_start((instant == begin + late * period,)), advance))
         if (turn := reader.members.turn(sample_name(call))) is not None:
             yield WhenChain((replace(advance, actions=(turn == 1 - pre(turn),)),))
     for call in (call for _, items in item.branches for call in checks_in(items)):
@@ -177,18 +178,4 @@ def begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
     names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
     scalars = (scalar for one in firsts for scalar in one.elements())
     own = tuple(one for one in scalars if one.dep(0).name() in names)
-    sampled = next((one for one in stated.branches if one.words == "sample"), None)
-    first = tuple(_first_actions(own, sampled)) if own and sampled is not None else own
-    return WhenChain((at_start(first), *stated.branches)) if own else stated
-
-
-def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
-    """What is set at the start, and what a sample makes of it where its first instant is the start."""
-    given = {one.dep(0).name(): one for one in own}
-    instants = [one for one in ca.symvar(sampled.condition) if SAMPLE in one.name()]
-    first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
-    for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
-        left = scalar.dep(0)
-        before = given.pop(left.name()).dep(1) if left.name() in given else pre(left)
-        yield left == if_else(first, scalar.dep(1), before)
-    yield from given.values()
+    return WhenChain((at_start(own), *stated.branches)) if own else stated
