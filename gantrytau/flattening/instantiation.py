@@ -154,7 +154,7 @@ class _Growing(Instance):
                 )
             member, modification = wanted, modification.more
         if isinstance(member, Outer):
-            self.outers.append((instance, name, member, [*around, instance]))
+            self.outers.append((instance, name, member, around if member.name else [*around, instance]))
         elif isinstance(member, Array):
             common = {key: value for key, value in modification.items() if isinstance(key, str)}
             count = 1 + max((key for key in modification if isinstance(key, int)), default=-1)

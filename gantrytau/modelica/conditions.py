@@ -82,6 +82,18 @@ def targets(items: Items) -> Iterator[str]:
                 yield each.parts[0][0]
 
 
+def whens_in(structure: Any) -> Iterator[tree.Branching]:
+    """All `when` among the equations of a class."""
+    left = [item for section in structure.scope.sections for item in section.items]
+    for item in left:
+        if isinstance(item, tree.Branching) and item.word == "when":
+            yield item
+        elif isinstance(item, tree.Branching):
+            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
+        elif isinstance(item, tree.ForLoop):
+            left += item.items
+
+
 def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
     """Calls of `assert`, and of `terminate` under a further condition, in a `when`."""
     for item in items:
@@ -120,6 +132,11 @@ def gives_value_before(item: tree.EquationOrStatement) -> bool:
         and isinstance(item.left, tree.Call)
         and is_call(item.left, "pre")
     )
+
+
+def outer_name(name: str) -> str:
+    """The member by which a class reaches the component around it that is `inner` of that name, where it has one as well."""
+    return f"outer {name}"
 
 
 def followed_name(kind: str, name: str) -> str:

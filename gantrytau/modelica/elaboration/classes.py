@@ -26,22 +26,27 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    outer_name,
     own_turn,
     sample_calls,
     sample_name,
     targets,
+    whens_in,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
 from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
+from gantrytau.modelica.overdetermined.records import closing
 from gantrytau.modelica.references import dotted, nodes_of, whole_name
 
 TAKEN = "a name that is taken, expected another name"
@@ -89,7 +94,8 @@ class ModelicaModel(TextClass, Model):
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
-            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+            past = at_start((getattr(self, AT_START) == 0,))
+            yield WhenChain((replace(past, waits=True),))
         for name in _followed(self.structure):
             old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
             now: Any = reduce(getattr, name.split("."), cast(Any, self))
@@ -105,6 +111,17 @@ class ModelicaModel(TextClass, Model):
 
 class ModelicaConnector(TextClass, Connector):
     """A connector of Modelica text."""
+
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
+        """Residuals of a connection that closes a loop."""
+
+        def residual(structure: Structure, one: Any, another: Any) -> Any:
+            function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
+            return to_casadi(
+                structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            )
+
+        yield from closing(self, other, residual)
 
 
 def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str, Any]:
@@ -156,10 +173,12 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
-    tests = (test for item in _whens(structure) for test, _ in item.branches)
+            if {"inner", "outer"} <= one.prefixes:
+                body[outer_name(name)] = Outer(Declared, name)
+    tests = (test for item in whens_in(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
         body[sample_name(call)] = Discrete(1e60, unit="s", description="next instant of sample()")
-    guarded = map(sample_name, guarded_samples(_whens(structure)))
+    guarded = map(sample_name, guarded_samples(whens_in(structure)))
     own = {n: tree.ComponentReference(0, ((n, ()),)) for n in _held_by_equations(structure)}
     integers = (own_turn(n) for n, one in own.items() if structure.values_of(one) is None)
     followed = _followed(structure)
@@ -173,7 +192,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     if taken is not None:
         scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
     for call in (
-        call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
+        call for item in whens_in(structure) for _, items in item.branches for call in checks_in(items)
     ):
         body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
@@ -187,7 +206,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
 
 def _asks_for_start(structure: Structure) -> bool:
     """Whether `initial()` stands elsewhere than alone as a condition of `when`."""
-    alone = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    alone = {id(one) for item in whens_in(structure) for test, _ in item.branches for one in instants(test)}
     nodes = (node for section in structure.scope.sections for node in nodes_of(section.items))
     calls = (one for one in nodes if isinstance(one, tree.Call) and id(one) not in alone)
     return any(one.function.parts[0][0] == "initial" for one in calls)
@@ -200,7 +219,7 @@ def _is_connector(structure: Structure) -> bool:
 def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in kinds or "operator" in definition.prefixes:
+    if definition.kind not in kinds:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif "expandable" in definition.prefixes:
@@ -246,15 +265,16 @@ def _held_by_equations(structure: Structure) -> Iterator[str]:
 def _held(structure: Structure) -> Iterator[str]:
     """Names of what a `when`, or an equation that asks for values before, sets."""
     yield from _held_by_equations(structure)
-    for item in _whens(structure):
+    for item in whens_in(structure):
         for _, items in item.branches:
             yield from targets(items)
 
 
 def _asked_before(structure: Structure) -> set[str]:
     """Names of the Booleans whose values before an instant are asked for."""
-    tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
-    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    tests = {id(one) for item in whens_in(structure) for test, _ in item.branches for one in instants(test)}
+    running = (one for one in structure.scope.sections if one.kind != "initial equation")
+    calls = (one for section in running for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
     asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
@@ -266,7 +286,7 @@ def _asked_before(structure: Structure) -> set[str]:
 
 def _followed(structure: Structure) -> dict[str, tuple[int, ...]]:
     """Names and sizes of the variables that need a Discrete with their value before an instant."""
-    branches = [branch for item in _whens(structure) for branch in item.branches]
+    branches = [branch for item in whens_in(structure) for branch in item.branches]
     changes = {name for test, items in branches for name in changed_in(test, items)}
     alone = {id(one) for test, _ in branches for one in instants(test)}
     said = [one.element.declaration.modification for one in structure.members.values()]
@@ -292,18 +312,6 @@ def _all_sections(structure: Structure) -> Iterator[StatementSection]:
             name = tree.ComponentReference(said.at, ((one.name, ()),))
             found = tree.SimpleEquation(said.at, None, None, "=", name, said.value)
             yield StatementSection("equation", (found,), said.scope)
-
-
-def _whens(structure: Structure) -> Iterator[tree.Branching]:
-    """All `when` among the equations of a class."""
-    left = [item for section in structure.scope.sections for item in section.items]
-    for item in left:
-        if isinstance(item, tree.Branching) and item.word == "when":
-            yield item
-        elif isinstance(item, tree.Branching):
-            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
-        elif isinstance(item, tree.ForLoop):
-            left += item.items
 
 
 def _component(one: ClassMember) -> Any:

@@ -17,6 +17,7 @@ from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.optimizations import with_parameters
 from gantrytau.modelica.parser import parse, read_tree
+from gantrytau.modelica.references import Members
 from gantrytau.modelica.source import SourceText
 
 PREDEFINED = """
@@ -133,9 +134,15 @@ class ModelicaLibrary:
         """The constants of a package."""
         return self._packages.setdefault(id(scope), Structure(scope, NOTHING, self))
 
-    def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
-        """The value of a function, or of the constructor of a record."""
-        return called_class(scope, arguments, named, self, self.package(scope))
+    def call(
+        self,
+        scope: ClassScope,
+        arguments: Sequence[Any],
+        named: Mapping[str, Any],
+        holder: Members | None = None,
+    ) -> Any:
+        """The value of a function, or of the constructor of a record; holder: of whose members its modifications speak."""
+        return called_class(scope, arguments, named, self, (self.package(scope), holder))
 
 
 Library = TypeVar("Library", bound=ModelicaLibrary)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.records.record_values import RecordValue
 
 
 @dataclass(frozen=True, eq=False)

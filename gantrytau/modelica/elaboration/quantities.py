@@ -24,6 +24,7 @@ from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.overdetermined.records import is_propagated, propagated_quantity
 from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
@@ -70,6 +71,9 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
         return
     words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
     kind = next((made for word, made in KINDS.items() if word in words_of), Real)
+    if is_propagated(structure):
+        body[name] = propagated_quantity(name, structure, one.shape, words)
+        return
     if is_free(one) and not _is_differentiated(one):
         kind = Input
     elif kind is Input and inside_optimization(structure):

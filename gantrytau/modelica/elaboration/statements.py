@@ -24,6 +24,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.elaboration.whens import chosen_actions, follows, when_chains
+from gantrytau.modelica.overdetermined.spanning import asking, is_operator, way
 from gantrytau.modelica.references import Members, nodes_of
 
 
@@ -84,15 +85,16 @@ def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenC
     now = sides(item, replace(reader, settled=True))
     for (variable, right), (_, settled) in zip(sides(item, reader), now, strict=True):
         if taken is None:
-            yield follows(settled, variable, turn, right)
+            chain = follows(settled, variable, turn, right)
+            yield WhenChain(tuple(replace(one, waits=True) for one in chain.branches))
             continue
         if reader.members.type_of(left) == "Boolean":
             test = values.condition(right)
             tests = [logic_not(test), test]
         else:
             tests = [logic_and(right > k - 0.5, right < k + 0.5) for k in taken]
-        acts = (Happening(one, (variable == k,), initially=True) for k, one in zip(taken, tests, strict=True))
-        yield WhenChain(tuple(acts))
+        acts = zip(taken, tests, strict=True)
+        yield WhenChain(tuple(Happening(t, (variable == k,), initially=True, waits=True) for k, t in acts))
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
@@ -207,6 +209,9 @@ def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
 
 def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     """An `if` among equations: what is known chooses, else the sides are chosen at all times."""
+    if (waiting := asking([test for test, _ in item.branches], [item], reader, stated)) is not None:
+        yield waiting
+        return
     tests, last = reader.open_branches(item.branches, item.otherwise or ())
     if not tests:
         yield from stated(last, reader)
@@ -254,6 +259,9 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
 def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> Iterator[Any]:
     """The assertion of a call. where: a condition; outside of it nothing is asserted."""
     name = item.call.function.parts[-1][0]
+    if is_operator(item.call):
+        yield way(item.call, reader)
+        return
     if name != "assert":
         raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")
     arguments = dict(zip(("condition", "message", "level"), item.call.arguments, strict=False)) | dict(

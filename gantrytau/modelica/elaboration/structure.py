@@ -17,6 +17,7 @@ from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
+from gantrytau.modelica.overdetermined.records import is_drawn
 from gantrytau.modelica.references import references
 from gantrytau.modelica.shaping import ask, ask_for_shapes
 
@@ -320,6 +321,8 @@ class ClassMember:
     def present(self) -> bool:
         """Whether its condition holds."""
         condition = self.element.declaration.condition
+        if self.primitive is None and is_drawn(self.plain_type):
+            return False
         if condition is None:
             return True
         if not isinstance(found := self.owner.interpreter(self.element.scope).value(condition), bool):

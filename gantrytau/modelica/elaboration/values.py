@@ -16,6 +16,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.events import delay
 from gantrytau.language.functions import fmax, fmin, if_else, logic_and, logic_not, logic_or, mod
 from gantrytau.language.symbols import der, pre
+from gantrytau.modelica.records.record_values import RecordValue, is_plain, record_value
 
 
 class EnumerationValue(int):
@@ -33,13 +34,9 @@ class EnumerationValue(int):
         return f"{self.type}.{self.literal}"
 
 
-class RecordValue(dict[str, Any]):
-    """The members of a record by name."""
-
-
 def array(items: Sequence[Any]) -> Any:
     """Values of one shape as an array with one more dimension; components and records as a list."""
-    if any(not isinstance(one, (bool, int, float, str, ca.SX, np.ndarray, np.number)) for one in items):
+    if not all(map(is_plain, items)):
         return list(items)
     shapes = {np.shape(one) if isinstance(one, np.ndarray) else () for one in items}
     if len(shapes) > 1:
@@ -232,7 +229,10 @@ def condition(value: Any) -> Any:
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
-    """`if test then ... else ...` where the test holds symbols; arrays element by element."""
+    """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
+    if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
+        a, b = record_value(then), record_value(otherwise)
+        return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
     if isinstance(then, np.ndarray) or isinstance(otherwise, np.ndarray):
         _same_shape("else", then, otherwise)
         return array([chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)])

@@ -1,7 +1,8 @@
-"""Values behind an assignment or a choice, and the number of rounds of a loop, where conditions and subscripts vary."""
+"""What assignments and branches of an algorithm make of a value: an element or a member changed, one of two chosen."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, cast
 
 import casadi as ca
@@ -11,7 +12,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, changed
-from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import references
 
 
@@ -39,17 +40,20 @@ def most_rounds(item: tree.WhileLoop, reader: Interpreter) -> int | None:
 
 
 def chosen_value(test: Any, then: Any, otherwise: Any) -> Any:
-    """`if test then ... else ...`, also of records; None where either is not known."""
+    """The value of a variable behind an `if` whose test varies; None where it has none in one of the branches."""
     if then is otherwise:
         return then
     if then is None or otherwise is None:
         return None  # not yet known in one branch: told where it is asked for
+    if isinstance(then, np.ndarray) and np.shape(then) == np.shape(otherwise):
+        return np.frompyfunc(partial(chosen_value, test), 2, 1)(then, otherwise)
     if isinstance(then, RecordValue):
-        return RecordValue({n: chosen_value(test, one, otherwise[n]) for n, one in then.items()})
+        each = {n: chosen_value(test, one, otherwise[n]) for n, one in then.items()}
+        return RecordValue(each, then.scope)
     return values.chosen(test, then, otherwise, smooth=False)
 
 
-def assigned(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
+def with_part(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
     """A value with another one where a reference points to."""
     subscripts, rest = parts[0][1], parts[1:]
     if len(parts) == 1 and not subscripts:
@@ -58,7 +62,7 @@ def assigned(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> A
         inner = parts[1][0]
         if not isinstance(old, RecordValue) or inner not in old:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
-        return RecordValue({**old, inner: assigned(old[inner], rest, new, reader)})
+        return RecordValue({**old, inner: with_part(old[inner], rest, new, reader)}, old.scope)
     if rest or not isinstance(old, np.ndarray):
         raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()

@@ -1,1 +1,0 @@
-"""What statements make of values that vary."""
