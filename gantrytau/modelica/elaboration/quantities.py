@@ -167,8 +167,8 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
     for name in names:
         one = child.members.get(name)
         inner = said.of_member(name)
-        if one is None or inner is None or not one.present:
-            continue  # a class that is redeclared, or what is not there
+        if one is None or inner is None or not one.present or (said.value is not None and one.own.final):
+            continue  # a class that is redeclared, what is not there, or has its value whatever the record's is
         if one.primitive is None and not one.shape:
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
