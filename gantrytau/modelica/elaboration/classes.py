@@ -32,17 +32,19 @@ from gantrytau.modelica.conditions import (
     targets,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import StatementSection
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
+from gantrytau.modelica.overdetermined.records import closing
 from gantrytau.modelica.references import dotted, nodes_of
 
 TAKEN = "a name that is taken, expected another name"
@@ -105,6 +107,17 @@ class ModelicaModel(TextClass, Model):
 
 class ModelicaConnector(TextClass, Connector):
     """A connector of Modelica text."""
+
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
+        """Residuals of a connection that closes a loop."""
+
+        def residual(structure: Structure, one: Any, another: Any) -> Any:
+            function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
+            return to_casadi(
+                structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            )
+
+        yield from closing(self, other, residual)
 
 
 def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str, Any]:
@@ -199,7 +212,7 @@ def _is_connector(structure: Structure) -> bool:
 def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in kinds or "operator" in definition.prefixes:
+    if definition.kind not in kinds:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif "expandable" in definition.prefixes:
@@ -307,16 +320,13 @@ def _component(one: ClassMember) -> Any:
     if not one.shape:
         (child,) = one.children
         return _opened(class_of(child), keywords_of(child, one.own, owner))
-    made: dict[int, type[Any]] = {}
-
-    def element(index: int) -> Any:
-        child = one.children[index]
-        made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
-
     found = Array(Declared, 0)
-    found.elements = [element(k) for k in range(one.shape[0])]
-    found.component = made[0] if made else Declared
+    found.shape = one.shape
+    for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
+        same = found.elements and not child_differs(one.children[0], child)
+        made: Any = found.component if same else class_of(child)
+        found.component = found.component if found.elements else made
+        found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 

@@ -16,6 +16,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, outer_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import AbsentComponent, stated
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
@@ -31,6 +32,21 @@ class PlacedMembers:
 
     def has(self, name: str) -> bool:
         return name in self.names()
+
+    @property
+    def scope(self) -> ClassScope:
+        """Its class."""
+        if self.structure is None:
+            raise ModelError(
+                f"found a function of {type(self.instance).__name__}, expected one of Modelica text"
+            )
+        return self.structure.scope
+
+    @property
+    def around(self) -> "PlacedMembers | None":
+        """The instance of which it is a component."""
+        found = around(self.instance)
+        return found and PlacedMembers(found)
 
     @property
     def instance_name(self) -> str:
@@ -55,7 +71,8 @@ class PlacedMembers:
         if isinstance(found, ca.SX):
             return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
         if isinstance(found, tuple):
-            return [PlacedMembers(each) for each in found]
+            each = [PlacedMembers(each) for each in found]
+            return each if one is None else values.in_rows(each, one.shape)
         return PlacedMembers(found) if isinstance(found, Declared) else found
 
     def shape(self, name: str) -> tuple[int, ...] | None:
