@@ -42,9 +42,8 @@ class Changes:
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
         own = (coordinates.substitutions, tuple(coordinates.arguments), coordinates.states)
-        self._impulses: Impulses | None = coordinates.kept(
-            "impulses", lambda: possible_impulses(dae, pieces, *own)
-        )
+        found = coordinates.kept("impulses", lambda: possible_impulses(dae, pieces, *own))
+        self._impulses: Impulses | None = found
         below = self._impulses.discretes if self._impulses else ()
         self._below = np.array([name in below for name in coordinates.discretes], dtype=bool)
         free = self._impulses is None and not dae.flat.slips
@@ -318,9 +317,7 @@ class Changes:
             modes = self._led_to(k, modes, errors, before)
             if np.array_equal(modes, tried[-1]):
                 return
-            if (
-                len(tried) > LONGEST_CIRCLE
-            ):  # each leads further away, as a loop of floor(x) with a gain above one
+            if len(tried) > LONGEST_CIRCLE:  # each leads further away, as floor(x) with a gain above one
                 changing = np.flatnonzero(modes != tried[0])
                 raise run_ends.no_side(self.coordinates.dae, float(t), self.conditions(changing))
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
