@@ -40,12 +40,13 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), and whether the program was solved."""
+    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), and whether the program was solved, or has no bound."""
 
     x: np.ndarray
     u: np.ndarray
     slack: np.ndarray
     solved: bool
+    unbounded: bool = False
 
 
 class HorizonProgram:
@@ -124,7 +125,7 @@ class HorizonProgram:
             self._solver.setup(*terms)
         else:
             self._solver.update(*terms)
-        solved = self._solver.solve() == piqp.Status.PIQP_SOLVED
+        status = self._solver.solve()
         v = np.array(self._solver.result.x)
         parts = v[: n * each].reshape(n, each)
         x = np.vstack([parts[:, :nx], v[n * each :]])
@@ -132,7 +133,8 @@ class HorizonProgram:
             x,
             parts[:, nx : nx + nu],
             parts[:, -1] if slack else np.zeros(n),
-            bool(solved and np.isfinite(v).all()),
+            bool(status == piqp.Status.PIQP_SOLVED and np.isfinite(v).all()),
+            status == piqp.Status.PIQP_DUAL_INFEASIBLE,
         )
 
 

@@ -13,7 +13,14 @@ from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
+from gantrytau_optimica.predictive.horizon_checks import (
+    check_bounded,
+    check_plan,
+    doubt_deadline,
+    doubt_samples,
+)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
     StepTimes,
@@ -49,8 +56,12 @@ class Mpc:
     disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
     `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
     objective is least at the set point (Pannocchia, Rawlings, 2003).
+    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
+    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
+    or [1, 1, 2, 4], the last one to the end.
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
-    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
+    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
+    without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """
 
     def __init__(
@@ -67,6 +78,9 @@ class Mpc:
         deadline: float | None = None,
         disturbance: Sequence[str] = (),
         parameters: Sequence[str] = (),
+        rates: Mapping[str, Any] | None = None,
+        step_penalty: Mapping[str, float] | None = None,
+        blocks: int | Sequence[int] = 1,
         guess: Mapping[str, Any] | Result | Answer | None = None,
     ):
         self.period = number("Mpc", "period", period, unit="s", above=0.0)
@@ -83,10 +97,16 @@ class Mpc:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self.name = self.built.read.name
+        check_bounded(self._stages)
+        doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
         finite = np.isfinite(self._stages.rows)
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
+        self._moves = moves = Moves(self._stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        nx = self._stages.nx + (self._stages.nu if moves.wanted else 0)
+        limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
+        soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
+        self._program = HorizonProgram(self.elements, nx, self._stages.nu, soft, finite, weight)
         self._terminal = Terminal(self._stages)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
@@ -147,6 +167,7 @@ class Mpc:
         kept = plan if before is None else before.shifted(t, self.period)
         self._plan = plan if solved else None if before is None else kept
         held = kept.u[0] if late or not solved else plan.u[0]
+        held = self._moves.reached(held, self._applied)
         self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
         self._missed += late
         wanting = self._converged and change >= STANDS
@@ -159,6 +180,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
+        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
@@ -172,12 +194,16 @@ class Mpc:
             else:
                 linear = self._linear(plan)
             found = self._solved(plan, linear, x)
+            if first and found.unbounded:
+                check_plan(self._stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
             self.softened = self._passed(found)
             if change < STANDS:
                 break
+        if first:
+            check_plan(self._stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
@@ -276,7 +302,13 @@ class Mpc:
             H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
             stages.lower_u - plan.u, stages.upper_u - plan.u,
         )  # fmt: skip
-        return self._program.solve(stage, P, p, x - plan.x[0])
+        first = x - plan.x[0]
+        if not self._moves.wanted:
+            return self._program.solve(stage, P, p, first)
+        stage, none = self._moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
+        P = np.pad(P, (0, stages.nu))
+        found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
+        return self._moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
