@@ -9,13 +9,12 @@ import numpy as np
 
 from gantrytau import ModelError, Result
 from gantrytau.answers.sampled_code import SampledCode
-from gantrytau.border.checks import array, instance, number, one_of, whole
+from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.control.build import build
-from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
 from gantrytau_optimica.predictive.horizon_checks import (
     check_bounded,
     check_plan,
@@ -33,8 +32,8 @@ from gantrytau_optimica.predictive.plan import (
 )
 from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
+from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.read_problem import read_problem
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
 STANDS = 1e-9  # changes of scaled variables by which iterations are done
@@ -56,6 +55,9 @@ class Mpc:
     until nothing changes. delay: periods from a measurement until its inputs are applied, 0 or 1; the state is foretold to
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
+    disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
+    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
+    objective is least at the set point (Pannocchia, Rawlings, 2003).
     rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
     from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
     or [1, 1, 2, 4], the last one to the end.
@@ -76,6 +78,8 @@ class Mpc:
         iterations: int | Literal["converged"] = 1,
         delay: int = 0,
         deadline: float | None = None,
+        disturbance: Sequence[str] = (),
+        parameters: Sequence[str] = (),
         rates: Mapping[str, Any] | None = None,
         step_penalty: Mapping[str, float] | None = None,
         blocks: int | Sequence[int] = 1,
@@ -93,7 +97,7 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self.stages = _staged(problem, self.period)
+        self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self.name = self.built.read.name
         check_bounded(self.stages)
         doubt_samples(self.built, self.period)
@@ -133,6 +137,11 @@ class Mpc:
         return tuple(s.name for s in self.stages.phase.inputs)
 
     @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of disturbances and parameters that `step` takes beside the state."""
+        return tuple(self._estimates)
+
+    @property
     def timing(self) -> StepTimes:
         """What all steps took until now."""
         return StepTimes(tuple(self._preparations), tuple(self._steps), self._missed)
@@ -147,8 +156,8 @@ class Mpc:
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
-        measured: the state by names, at time t in s. What is not finite is taken as the plan foretold it, and `.status` says
-        "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
         (x, lost), reached = self._state(measured), True
@@ -225,21 +234,25 @@ class Mpc:
         start: Mapping[str, Any] | None = None,
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
+        estimator: StateEstimator | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
         plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit.
+        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
+        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
         """
+        if estimator is not None:
+            instance("run", "estimator", estimator, StateEstimator, "a MovingHorizon or an ExtendedKalman")
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
         other = (
-            _staged(plant, step)
+            _staged(plant, step)[:2]
             if plant is not None
             else (self.built, HorizonStages(self.built.problem, step))
         )
-        return closed_loop(self, other, stop, start or {}, noise or {}, seed)
+        return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
 
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
@@ -261,19 +274,11 @@ class Mpc:
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
-        flat, found = self.built.read.dae.flat, {}
-        instance(
-            self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
-        )
-        for name, value in measured.items():
-            elements = flat.expand(name)
-            unknown = [one for one in elements if one not in self.states]
-            if unknown:
-                words = f"expected the states {', '.join(self.states)}{did_you_mean(unknown[0], self.states)}"
-                raise ModelError(words, place=self.name, found=Given("measured", name))
-            shape = (len(elements),) if len(elements) > 1 else ()
-            values = array(self.name, name, value, shape, finite=False)
-            found.update(zip(elements, np.ravel(values), strict=True))
+        names = (*self.states, *self.estimated)
+        found = named_values(self.built.read.dae.flat, self.name, "measured", measured, names, finite=False)
+        self._estimates |= {
+            name: found[name] for name in self.estimated if math.isfinite(found.get(name, math.nan))
+        }
         missing = [name for name in self.states if name not in found]
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
@@ -338,13 +343,15 @@ class Mpc:
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 
-def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
-    """The problem in states, algebraics and inputs, and its stages; ModelError for what no receding horizon can have."""
-    read = read_problem(problem)
-    built = build(read, {}, (), {}, "forward")
-    found: ControlProblem = built.problem
-    if len(found.phases) > 1:
-        raise ModelError("phases are not for a receding horizon, expected one problem", place=read.name)
+def _staged(
+    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
+) -> tuple[Any, HorizonStages, dict[str, float]]:
+    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
+    horizon can have.
+    """
+    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
+    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
+    read, found = built.read, built.problem
     if found.free:
         names = ", ".join(n.name for n in found.free)
         raise ModelError(
@@ -354,4 +361,4 @@ def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
         )
     if not any(phase.inputs for phase in found.phases):
         raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, HorizonStages(found, period)
+    return built, HorizonStages(found, period), estimates
