@@ -122,6 +122,11 @@ def gives_value_before(item: tree.EquationOrStatement) -> bool:
     )
 
 
+def outer_name(name: str) -> str:
+    """The member by which a class reaches the component around it that is `inner` of that name, where it has one as well."""
+    return f"outer {name}"
+
+
 def followed_name(kind: str, name: str) -> str:
     """The name of a Discrete that follows a variable."""
     return kind + name.replace(".", "_")

@@ -11,7 +11,7 @@ import numpy as np
 SIGNALS, SETTINGS = "comparisonSignals.txt", "creation.txt"
 SETTING = re.compile(r"^(StartTime|StopTime|Interval|Tolerance)\s*=\s*([-+.\deE]+)", re.MULTILINE)
 POINTER = b"version https://git-lfs"  # the beginning of a file that stands for a large one
-LONGEST_RANGE = 5001  # points
+LONGEST_RANGE = 20_001  # points
 POINTS = 501  # at least
 
 

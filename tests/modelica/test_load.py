@@ -227,6 +227,17 @@ def test_what_is_final_has_no_other_value_and_a_flow_meets_flows(tmp_path):
         simulate(library["F"](), stop=1.0, parameters={"k": 2.0})
 
 
+def test_a_file_within_a_package_comes_before_it_and_names_the_class_of_its_name(tmp_path):
+    (tmp_path / "use.mo").write_text("within Lag;\nmodel Use\n extends Lag.Lag(k=2);\nend Use;")
+    (tmp_path / "lag.mo").write_text(
+        "package Lag\nmodel Lag\n parameter Real k;\n Real x(start=1, fixed=true);\nequation\n der(x) = -k*x;\nend Lag;\n"
+        "end Lag;"
+    )
+    library = load_modelica(tmp_path / "use.mo", tmp_path / "lag.mo")
+    assert library.names == ("Lag.Lag", "Lag.Use")
+    assert simulate(library["Lag.Use"](), stop=1.0)["x"][-1] == pytest.approx(np.exp(-2), rel=1e-7)
+
+
 def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):
     (tmp_path / "Lib" / "Parts").mkdir(parents=True)
     (tmp_path / "Lib" / "package.mo").write_text("package Lib\nend Lib;")

@@ -14,12 +14,15 @@ from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import action_of, looped
-from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
-from gantrytau.modelica.references import Members
+from gantrytau.modelica.records.assigned import chosen_value, with_part
+from gantrytau.modelica.records.operators import function_for
+from gantrytau.modelica.records.record_values import RecordValue
+from gantrytau.modelica.references import Members, holding, references
 
 MOST_ROUNDS = 100_000  # of a `while`
 
@@ -92,9 +95,9 @@ class Execution:
                 try:
                     if target.parts == ((name, ()),):
                         self._check_shape(name, one)
-                    found = _with(self.known[name], target.parts, one, reader)
+                    found = with_part(self.known[name], target.parts, one, reader)
                     for gone in self.left.values():
-                        found = found if gone is False else _chosen(gone, self.known[name], found, name)
+                        found = found if gone is False else chosen_value(gone, self.known[name], found, name)
                     self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
@@ -181,8 +184,10 @@ class Execution:
         for test, items in reversed(tests):
             other, left = self.known, self.left
             self._carry_out(items, local, before, gone)
-            self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
-            self.left = {word: _chosen(test, one, left[word], word) for word, one in self.left.items()}
+            self.known = {
+                name: chosen_value(test, one, other[name], name) for name, one in self.known.items()
+            }
+            self.left = {word: chosen_value(test, one, left[word], word) for word, one in self.left.items()}
         for word in (word for word, one in self.left.items() if one is True):
             self.left = gone
             raise LeftBlock(word)
@@ -199,40 +204,6 @@ class Execution:
                 lambda a, b: values.binary("and", a, values.unary("not", b)), self.left.values(), True
             )
             self.left[str(left)] = values.binary("or", self.left[str(left)], here)
-
-
-def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
-    if then is otherwise:
-        return then
-    if then is None or otherwise is None:
-        return None  # not yet known in one branch: told where it is asked for
-    if isinstance(then, RecordValue):
-        return RecordValue({n: _chosen(test, one, otherwise[n], n) for n, one in then.items()})
-    return values.chosen(test, then, otherwise, smooth=False)
-
-
-def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
-    """A value with another one where a reference points to."""
-    subscripts, rest = parts[0][1], parts[1:]
-    if len(parts) == 1 and not subscripts:
-        return new
-    if not subscripts:
-        inner = parts[1][0]
-        if not isinstance(old, RecordValue) or inner not in old:
-            raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
-        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
-    if rest or not isinstance(old, np.ndarray):
-        raise ModelError("found an element of no array of a known size assigned, expected an array")
-    found = old.copy()
-    places = tuple(reader.places(one, size) for one, size in zip(subscripts, old.shape, strict=True))
-    many = [place if isinstance(place, list) else [place] for place in places]
-    shape = tuple(len(place) for place in places if isinstance(place, list))
-    if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
-        raise ModelError(f"found {values.size_words(new)} assigned to {list(shape)}, expected one size")
-    flat = iter(new.flat) if isinstance(new, np.ndarray) else iter([new])
-    for index in np.ndindex(*map(len, many)):
-        found[tuple(axis[k] for axis, k in zip(many, index, strict=True))] = next(flat)
-    return found
 
 
 def stated_by_algorithm(
@@ -272,12 +243,19 @@ def called_class(
     arguments: Sequence[Any],
     named: Mapping[str, Any],
     beyond: Surroundings,
-    constants: Members,
+    known: tuple[Members, Members | None],
 ) -> Any:
-    """The value of a function, several as a tuple, or of the constructor of a record."""
+    """The value of a function, several as a tuple, or of the constructor of a record.
+
+    known: the constants of its package, and the instance of whose members its modifications speak.
+    """
     definition = scope.definition
     if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
         scope = made
+    if definition.kind == "record" and (
+        made := function_for(scope, "constructor", (*arguments, *named.values()))
+    ):
+        return beyond.call(made, arguments, named)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
@@ -290,17 +268,18 @@ def called_class(
         longer = {n for n, one in given.items() if _is_longer(inputs[n], one)}
         count = range(len(given[mapped]))
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
-        each = [called_class(scope, (), one, beyond, constants) for one in all_given]
+        each = [called_class(scope, (), one, beyond, known) for one in all_given]
         return values.array(each)
     if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
+    constants, holder = known
     run = Execution(Interpreter(scope, constants, beyond), {})
     for name, element in (scope.elements if external is None and not record else inputs).items():
         run.declare(
-            name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
+            name, element, given[name] if name in given else _initial(element, run, holder, name in inputs)
         )
     if record:
-        return RecordValue(run.known)
+        return RecordValue(run.known, scope)
     if external is not None:
         return _external(scope, external, run)
     try:
@@ -351,8 +330,13 @@ def _is_longer(element: Element, value: Any) -> bool:
 
 
 def _is_array_type(element: Element) -> bool:
-    body = element.scope.find_class(element.clause.type, element.clause.at).definition.body
-    return isinstance(body, tree.ShortClass) and bool(body.subscripts)
+    here: ClassScope | None = element.scope.find_class(element.clause.type, element.clause.at)
+    while here is not None and here.is_primitive:
+        body = here.definition.body
+        if isinstance(body, tree.ShortClass) and body.subscripts:
+            return True
+        here = here.bases[0][0] if here.bases else None
+    return False
 
 
 def _given(
@@ -370,11 +354,14 @@ def _given(
     return found
 
 
-def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:
+def _initial(element: Element, run: Execution, holder: Members | None, needed: bool) -> Any:
     """The value of what a function declares, before its algorithm; None, or an array of None, where it has none."""
     reader = replace(run.reader, scope=element.scope, local={**run.reader.local, **run.known})
-    said = element.modifier
+    said, name = element.modifier, element.declaration.name
     if said.value is not None:
+        holder = None if said.scope is element.scope else holding(holder, references(said.value))
+        if holder is not None:
+            return Interpreter(said.scope, holder, reader.library).value(said.value)
         return replace(reader, scope=said.scope).value(said.value)
     if needed:
         raise ModelError(f"found no value for '{name}' of {run.reader.scope.name}, expected one")
@@ -382,5 +369,9 @@ def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:
     if any(isinstance(one, tree.Mark) for one in sizes) or not sizes:
         kind = element.scope.find_class(element.clause.type, element.clause.at)
         members = kind.elements if kind.definition.kind == "record" else {}
-        return RecordValue(dict.fromkeys(members)) if members else None
+        given = ((n, said.inner.get(n)) for n in members)
+        known = {
+            n: one and one.value and replace(reader, scope=one.scope).value(one.value) for n, one in given
+        }
+        return RecordValue(known, kind) if members else None
     return np.empty([reader.value(one) for one in sizes], dtype=object)

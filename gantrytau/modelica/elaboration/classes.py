@@ -26,22 +26,25 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    outer_name,
     sample_calls,
     sample_name,
     targets,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import StatementSection
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
     stated,
 )
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
+from gantrytau.modelica.overdetermined.records import closing
 from gantrytau.modelica.references import dotted, nodes_of
 
 TAKEN = "a name that is taken, expected another name"
@@ -89,7 +92,8 @@ class ModelicaModel(TextClass, Model):
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
-            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+            past = at_start((getattr(self, AT_START) == 0,))
+            yield WhenChain((replace(past, waits=True),))
         for name in _followed(self.structure):
             old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
             yield follows(reduce(getattr, name.split("."), self), old, turn)
@@ -103,6 +107,17 @@ class ModelicaModel(TextClass, Model):
 
 class ModelicaConnector(TextClass, Connector):
     """A connector of Modelica text."""
+
+    def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
+        """Residuals of a connection that closes a loop."""
+
+        def residual(structure: Structure, one: Any, another: Any) -> Any:
+            function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
+            return to_casadi(
+                structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            )
+
+        yield from closing(self, other, residual)
 
 
 def _shaping(structure: Structure, modifications: Mapping[str, Any]) -> dict[str, Any]:
@@ -154,6 +169,8 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
+            if {"inner", "outer"} <= one.prefixes:
+                body[outer_name(name)] = Outer(Declared, name)
     tests = (test for item in _whens(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
         known = structure.is_fixed(call.arguments[0])  # else it is set at the start
@@ -195,7 +212,7 @@ def _is_connector(structure: Structure) -> bool:
 def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in kinds or "operator" in definition.prefixes:
+    if definition.kind not in kinds:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif "expandable" in definition.prefixes:
@@ -244,7 +261,8 @@ def _held(structure: Structure) -> Iterator[str]:
 def _asked_before(structure: Structure) -> set[str]:
     """Names of the Booleans whose values before an instant are asked for."""
     tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
-    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    running = (one for one in structure.scope.sections if one.kind != "initial equation")
+    calls = (one for section in running for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
     asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
@@ -302,16 +320,13 @@ def _component(one: ClassMember) -> Any:
     if not one.shape:
         (child,) = one.children
         return _opened(class_of(child), keywords_of(child, one.own, owner))
-    made: dict[int, type[Any]] = {}
-
-    def element(index: int) -> Any:
-        child = one.children[index]
-        made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
-
     found = Array(Declared, 0)
-    found.elements = [element(k) for k in range(one.shape[0])]
-    found.component = made[0] if made else Declared
+    found.shape = one.shape
+    for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
+        same = found.elements and not child_differs(one.children[0], child)
+        made: Any = found.component if same else class_of(child)
+        found.component = found.component if found.elements else made
+        found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 

@@ -12,9 +12,13 @@ from gantrytau.language.functions import logic_or
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
-from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
-from gantrytau.modelica.references import Members, dotted
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue
+from gantrytau.modelica.overdetermined.spanning import answered, is_operator
+from gantrytau.modelica.records.operators import operated
+from gantrytau.modelica.records.record_values import RecordValue
+from gantrytau.modelica.references import Members, called_function, component_of, dotted, function_name
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -26,13 +30,34 @@ class Surroundings(Protocol):
         """The constants of a package."""
         ...
 
-    def call(self, scope: ClassScope, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
-        """The value of a function, or of the constructor of a record; several results as a tuple."""
+    def call(
+        self,
+        scope: ClassScope,
+        arguments: Sequence[Any],
+        named: Mapping[str, Any],
+        holder: Members | None = None,
+    ) -> Any:
+        """The value of a function, or of the constructor of a record; several results as a tuple.
+
+        holder: the instance of whose members modifications of the function speak.
+        """
 
 
 def changed(new: Any, old: Any) -> Any:
     """Whether a Boolean, Integer or number of an enumeration is another one."""
     return logic_or(new > old + 0.5, new < old - 0.5)
+
+
+def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
+    """The components of a list, or of lists in it, at the places of each dimension."""
+    if not places:
+        return components
+    place, *rest = places
+    return (
+        _elements(components[place], rest)
+        if isinstance(place, int)
+        else [_elements(components[k], rest) for k in place]
+    )
 
 
 def first_result(value: Any) -> Any:
@@ -79,7 +104,7 @@ class Interpreter:
         except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
-    def _number(self, e: tree.Number) -> Any:
+    def _stated(self, e: tree.Number | tree.BooleanLiteral) -> Any:
         return e.value
 
     def _literal(self, e: tree.StringLiteral) -> str:
@@ -89,22 +114,19 @@ class Interpreter:
             else e.text
         )
 
-    def _boolean(self, e: tree.BooleanLiteral) -> bool:
-        return e.value
-
     def _mark(self, e: tree.Mark) -> Any:
         if e.word != "end" or self.end is None:
             raise ModelError(f"found '{e.word}', expected a value")
         return self.end
 
     def _unary(self, e: tree.Unary) -> Any:
-        return values.unary(e.operator, self.value(e.operand))
+        return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
         left = self.value(e.left)
         if e.operator in ("and", "or") and left is (e.operator == "or"):
             return left  # the other side may have no value
-        return values.binary(e.operator, left, self.value(e.right))
+        return operated(e.operator, [left, self.value(e.right)], self.library.call)
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
@@ -244,19 +266,14 @@ class Interpreter:
         """The elements of an array or list that subscripts choose."""
         if not subscripts:
             return value
-        shape = (
-            (len(value),)
-            if isinstance(value, list)
-            else np.shape(value if isinstance(value, np.ndarray) else 0)
-        )
+        shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
         if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
-            (place,) = places
-            return value[place] if isinstance(place, int) else [value[k] for k in place]
+            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value
@@ -300,7 +317,9 @@ class Interpreter:
         return places if isinstance(found, np.ndarray) else places[0]
 
     def _call(self, e: tree.Call) -> Any:
-        name = ".".join(part for part, _ in e.function.parts)
+        name = function_name(e)
+        if is_operator(e):
+            return answered(e, self)
         quiet = name == "noEvent" or (name == "smooth" and self.value(e.arguments[0]) > 0)
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
@@ -323,11 +342,11 @@ class Interpreter:
             return self.members.next_sample(e) > 0.5
         if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
-        name, function = self.function(e)
+        name, function = called_function(e, self)
         arguments = [inner.value(one) for one in e.arguments]
         named = {key: inner.value(one) for key, one in e.named}
         if function is not None:
-            return self.library.call(function, arguments, named)
+            return self.library.call(function, arguments, named, component_of(e, self) or self.members)
         if self.members.has(name):
             raise ModelError(
                 f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
@@ -348,15 +367,6 @@ class Interpreter:
             return old
         return new > old + 0.5 if asked == "edge" else changed(new, old)
 
-    def function(self, e: tree.Call) -> tuple[str, ClassScope | None]:
-        """The name of the function that is called, and its class; None for one of the language."""
-        name = ".".join(part for part, _ in e.function.parts)
-        start, first = (self.scope.root, name[1:]) if name.startswith(".") else (self.scope, name)
-        found = None if name in ("der", "pure", "initial") else start.first(first.split(".")[0])
-        if "." not in first and (found is None or found.predefined):
-            return first, None
-        return name, self.scope.find_class(name, e.at)
-
     def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
         """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
         if not isinstance(e, tree.ComponentReference):
@@ -371,9 +381,9 @@ class Interpreter:
 
 
 _EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
-    tree.Number: Interpreter._number,
+    tree.Number: Interpreter._stated,
     tree.StringLiteral: Interpreter._literal,
-    tree.BooleanLiteral: Interpreter._boolean,
+    tree.BooleanLiteral: Interpreter._stated,
     tree.Mark: Interpreter._mark,
     tree.Unary: Interpreter._unary,
     tree.Binary: Interpreter._binary,

@@ -24,6 +24,7 @@ from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.overdetermined.records import is_propagated, propagated_quantity
 from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
@@ -70,6 +71,9 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
         return
     words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
     kind = next((made for word, made in KINDS.items() if word in words_of), Real)
+    if is_propagated(structure):
+        body[name] = propagated_quantity(name, structure, one.shape, words)
+        return
     if is_free(one) and not _is_differentiated(one):
         kind = Input
     elif kind is Input and inside_optimization(structure):
@@ -166,8 +170,8 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
             found[name] = [
-                keywords_of(x, inner.of_element(k, len(one.children)), structure)
-                for k, x in enumerate(one.children)
+                keywords_of(x, each, structure)
+                for x, each in zip(one.children, inner.of_elements(one.shape), strict=True)
             ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, without_optimica(one, inner, False), structure)

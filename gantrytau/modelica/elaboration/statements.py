@@ -23,6 +23,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
 from gantrytau.modelica.elaboration.whens import chosen_actions, when_chains
+from gantrytau.modelica.overdetermined.spanning import asking, is_operator, way
 from gantrytau.modelica.references import Members, nodes_of
 
 
@@ -81,11 +82,12 @@ def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iter
     """What makes a Boolean, or an Integer between limits, follow an expression that asks for values before."""
     if limits is None:
         right = values.condition(right)
-        yield Happening(right, (left == 1,), initially=True)
-        yield Happening(logic_not(right), (left == 0,), initially=True)
+        yield Happening(right, (left == 1,), initially=True, waits=True)
+        yield Happening(logic_not(right), (left == 0,), initially=True, waits=True)
         return
     for value in range(limits[0], limits[1] + 1):
-        yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
+        here = logic_and(right > value - 0.5, right < value + 0.5)
+        yield Happening(here, (left == value,), initially=True, waits=True)
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
@@ -200,6 +202,9 @@ def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
 
 def _branches(item: tree.Branching, reader: Interpreter) -> Iterator[Any]:
     """An `if` among equations: what is known chooses, else the sides are chosen at all times."""
+    if (waiting := asking([test for test, _ in item.branches], [item], reader, stated)) is not None:
+        yield waiting
+        return
     tests, last = reader.open_branches(item.branches, item.otherwise or ())
     if not tests:
         yield from stated(last, reader)
@@ -247,6 +252,9 @@ def _differences(items: Items, reader: Interpreter) -> list[ca.SX]:
 def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> Iterator[Any]:
     """The assertion of a call. where: a condition; outside of it nothing is asserted."""
     name = item.call.function.parts[-1][0]
+    if is_operator(item.call):
+        yield way(item.call, reader)
+        return
     if name != "assert":
         raise ModelError(f"found {name}() among equations, expected it in 'when', or an equation")
     arguments = dict(zip(("condition", "message", "level"), item.call.arguments, strict=False)) | dict(

@@ -16,6 +16,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.events import delay
 from gantrytau.language.functions import fmax, fmin, if_else, logic_and, logic_not, logic_or, mod
 from gantrytau.language.symbols import der, pre
+from gantrytau.modelica.records.record_values import RecordValue, is_plain, record_value
 
 
 class EnumerationValue(int):
@@ -33,13 +34,9 @@ class EnumerationValue(int):
         return f"{self.type}.{self.literal}"
 
 
-class RecordValue(dict[str, Any]):
-    """The members of a record by name."""
-
-
 def array(items: Sequence[Any]) -> Any:
     """Values of one shape as an array with one more dimension; components and records as a list."""
-    if any(not isinstance(one, (bool, int, float, str, ca.SX, np.ndarray, np.number)) for one in items):
+    if not all(map(is_plain, items)):
         return list(items)
     shapes = {np.shape(one) if isinstance(one, np.ndarray) else () for one in items}
     if len(shapes) > 1:
@@ -61,6 +58,21 @@ def from_casadi(symbol: ca.SX, shape: tuple[int, ...]) -> Any:
     for place, one in zip(np.ndindex(shape[::-1]), symbol.elements(), strict=True):  # column after column
         found[place[::-1]] = one
     return found
+
+
+def in_rows(items: Sequence[Any], shape: tuple[int, ...]) -> Any:
+    """Components that stand row after row as a list for each dimension; the one of a scalar."""
+    if not shape:
+        return items[0]
+    size = len(items) // shape[0] if shape[0] else 0
+    return [in_rows(items[k * size : (k + 1) * size], shape[1:]) for k in range(shape[0])]
+
+
+def all_sizes(value: Any) -> tuple[int, ...]:
+    """The sizes of an array, also one of components."""
+    if isinstance(value, list):
+        return (len(value), *(all_sizes(value[0]) if value else ()))
+    return np.shape(_shaped(value))
 
 
 def to_casadi(value: Any) -> Any:
@@ -217,7 +229,10 @@ def condition(value: Any) -> Any:
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
-    """`if test then ... else ...` where the test holds symbols; arrays element by element."""
+    """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
+    if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
+        a, b = record_value(then), record_value(otherwise)
+        return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
     if isinstance(then, np.ndarray) or isinstance(otherwise, np.ndarray):
         _same_shape("else", then, otherwise)
         return array([chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)])
@@ -249,7 +264,7 @@ def _reduced(function: Callable[[Any, Any], Any], start: Any) -> Callable[..., A
 
 
 def _size(value: Any, dimension: int | None = None) -> Any:
-    shape = (len(value),) if isinstance(value, list) else np.shape(_shaped(value))
+    shape = all_sizes(value)
     if dimension is None:
         return array(list(shape))
     if not 1 <= dimension <= len(shape):

@@ -185,12 +185,12 @@ class Changes:
             return k
         for _ in range(MOST):
             now = rounds.holding(self.point(k))
-            rose, self._holding = now & ~self._holding, now
+            rose, self._holding = rounds.rising(now, self._holding)
             if not rose.any() or self.ended:
                 return k
             if self.coordinates.dae.flat.slips:
                 waits = self.coordinates.slips.postponed(rose, self.point(k))
-                rose, self._holding = rose & ~waits, now & ~waits
+                rose, self._holding = rose & ~waits, self._holding & ~waits
             made = rounds.made(self.point(k), rose)
             self.acts += made.acts != 0
             acting = [rounds.whens[i] for i in np.flatnonzero(made.acts)]

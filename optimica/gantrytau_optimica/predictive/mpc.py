@@ -8,13 +8,19 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.border.checks import array, instance, number, one_of, whole
+from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.control.build import build
-from gantrytau_optimica.control.control_problem import ControlProblem
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
+from gantrytau_optimica.predictive.horizon_checks import (
+    check_bounded,
+    check_plan,
+    doubt_deadline,
+    doubt_samples,
+)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
     StepTimes,
@@ -24,8 +30,8 @@ from gantrytau_optimica.predictive.plan import (
 )
 from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
+from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.read_problem import read_problem
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
 STANDS = 1e-9  # changes of scaled variables by which iterations are done
@@ -47,8 +53,15 @@ class Mpc:
     until nothing changes. delay: periods from a measurement until its inputs are applied, 0 or 1; the state is foretold to
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
+    disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
+    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
+    objective is least at the set point (Pannocchia, Rawlings, 2003).
+    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
+    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
+    or [1, 1, 2, 4], the last one to the end.
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
-    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
+    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
+    without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """
 
     def __init__(
@@ -63,6 +76,11 @@ class Mpc:
         iterations: int | Literal["converged"] = 1,
         delay: int = 0,
         deadline: float | None = None,
+        disturbance: Sequence[str] = (),
+        parameters: Sequence[str] = (),
+        rates: Mapping[str, Any] | None = None,
+        step_penalty: Mapping[str, float] | None = None,
+        blocks: int | Sequence[int] = 1,
         guess: Mapping[str, Any] | Result | Answer | None = None,
     ):
         self.period = number("Mpc", "period", period, unit="s", above=0.0)
@@ -77,12 +95,18 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self._stages = _staged(problem, self.period)
+        self.built, self._stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self.name = self.built.read.name
+        check_bounded(self._stages)
+        doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self._stages.curvature if penalty is None else penalty
         finite = np.isfinite(self._stages.rows)
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
+        self._moves = moves = Moves(self._stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        nx = self._stages.nx + (self._stages.nu if moves.wanted else 0)
+        limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
+        soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
+        self._program = HorizonProgram(self.elements, nx, self._stages.nu, soft, finite, weight)
         self._terminal = Terminal(self._stages)
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
@@ -110,6 +134,11 @@ class Mpc:
         return tuple(s.name for s in self._stages.phase.inputs)
 
     @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of disturbances and parameters that `step` takes beside the state."""
+        return tuple(self._estimates)
+
+    @property
     def timing(self) -> StepTimes:
         """What all steps took until now."""
         return StepTimes(tuple(self._preparations), tuple(self._steps), self._missed)
@@ -124,7 +153,8 @@ class Mpc:
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
-        measured: the state by names, at time t in s. What is not finite is taken as the plan foretold it, and `.status` says
+        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
+        What is not finite is taken as the plan foretold it, and `.status` says
         "lost". ModelError for names that are no states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
@@ -137,6 +167,7 @@ class Mpc:
         kept = plan if before is None else before.shifted(t, self.period)
         self._plan = plan if solved else None if before is None else kept
         held = kept.u[0] if late or not solved else plan.u[0]
+        held = self._moves.reached(held, self._applied)
         self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
         self._missed += late
         wanting = self._converged and change >= STANDS
@@ -149,6 +180,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
+        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
@@ -162,12 +194,16 @@ class Mpc:
             else:
                 linear = self._linear(plan)
             found = self._solved(plan, linear, x)
+            if first and found.unbounded:
+                check_plan(self._stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
             self.softened = self._passed(found)
             if change < STANDS:
                 break
+        if first:
+            check_plan(self._stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
@@ -195,21 +231,25 @@ class Mpc:
         start: Mapping[str, Any] | None = None,
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
+        estimator: StateEstimator | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
         plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit.
+        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
+        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
         """
+        if estimator is not None:
+            instance("run", "estimator", estimator, StateEstimator, "a MovingHorizon or an ExtendedKalman")
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
         other = (
-            _staged(plant, step)
+            _staged(plant, step)[:2]
             if plant is not None
             else (self.built, HorizonStages(self.built.problem, step))
         )
-        return closed_loop(self, other, stop, start or {}, noise or {}, seed)
+        return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
 
     @property
     def held(self) -> dict[str, float]:
@@ -222,19 +262,11 @@ class Mpc:
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
-        flat, found = self.built.read.dae.flat, {}
-        instance(
-            self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
-        )
-        for name, value in measured.items():
-            elements = flat.expand(name)
-            unknown = [one for one in elements if one not in self.states]
-            if unknown:
-                words = f"expected the states {', '.join(self.states)}{did_you_mean(unknown[0], self.states)}"
-                raise ModelError(words, place=self.name, found=Given("measured", name))
-            shape = (len(elements),) if len(elements) > 1 else ()
-            values = array(self.name, name, value, shape, finite=False)
-            found.update(zip(elements, np.ravel(values), strict=True))
+        names = (*self.states, *self.estimated)
+        found = named_values(self.built.read.dae.flat, self.name, "measured", measured, names, finite=False)
+        self._estimates |= {
+            name: found[name] for name in self.estimated if math.isfinite(found.get(name, math.nan))
+        }
         missing = [name for name in self.states if name not in found]
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
@@ -270,7 +302,13 @@ class Mpc:
             H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
             stages.lower_u - plan.u, stages.upper_u - plan.u,
         )  # fmt: skip
-        return self._program.solve(stage, P, p, x - plan.x[0])
+        first = x - plan.x[0]
+        if not self._moves.wanted:
+            return self._program.solve(stage, P, p, first)
+        stage, none = self._moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
+        P = np.pad(P, (0, stages.nu))
+        found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
+        return self._moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
@@ -290,13 +328,15 @@ class Mpc:
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 
-def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
-    """The problem in states, algebraics and inputs, and its stages; ModelError for what no receding horizon can have."""
-    read = read_problem(problem)
-    built = build(read, {}, (), {}, "forward")
-    found: ControlProblem = built.problem
-    if len(found.phases) > 1:
-        raise ModelError("phases are not for a receding horizon, expected one problem", place=read.name)
+def _staged(
+    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
+) -> tuple[Any, HorizonStages, dict[str, float]]:
+    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
+    horizon can have.
+    """
+    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
+    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
+    read, found = built.read, built.problem
     if found.free:
         names = ", ".join(n.name for n in found.free)
         raise ModelError(
@@ -306,4 +346,4 @@ def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
         )
     if not any(phase.inputs for phase in found.phases):
         raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, HorizonStages(found, period)
+    return built, HorizonStages(found, period), estimates
