@@ -157,7 +157,8 @@ class Mpc:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
         measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
-        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
+        states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
         (x, lost), reached = self._state(measured), True
