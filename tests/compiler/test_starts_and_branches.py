@@ -2,6 +2,7 @@
 
 from typing import Any, cast
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -23,6 +24,8 @@ from gantrytau import (
     translate,
     with_setting,
 )
+from gantrytau.compiler.start.consistency import _solve
+from gantrytau.compiler.start.level import Level
 from gantrytau.mechanics import multibody
 from gantrytau.mechanics.translational import Mass
 from gantrytau_models import FourBar
@@ -214,3 +217,11 @@ def test_equations_without_a_value_before_the_initial_ones_hold():
             yield self.y == self.u
 
     assert translate(Measured()).start["y"] == pytest.approx(2)
+
+
+def test_an_infinite_slope_at_the_solution_is_no_obstacle_to_the_start():
+    u, y, w = (ca.SX.sym(name) for name in "uyw")
+    rows = (u, y + 1.5 - ca.sqrt(u), w**3 + w - 0.5 - y)
+    level, values = Level(rows, ("a", "b", "c"), ("u", "y", "w"), frozenset()), dict(u=0.0, y=0.0, w=0.0)
+    _solve(level, ("u", "y", "w"), values, {"y"}, "title")
+    assert [values["y"], values["w"] ** 3 + values["w"]] == pytest.approx([-1.5, -1.0], rel=1e-9)
