@@ -96,6 +96,7 @@ class Mpc:
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self._stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         check_bounded(self._stages)
         doubt_samples(self.built, self.period)
@@ -153,7 +154,8 @@ class Mpc:
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
-        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
+        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out;
+        what was prepared before takes them a period later.
         What is not finite is taken as the plan foretold it, and `.status` says
         "lost". ModelError for names that are no states, and for a first measurement that is not finite.
         """
@@ -219,8 +221,9 @@ class Mpc:
         return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
 
     def reset(self) -> None:
-        """Forget the plan: the next step makes a first one."""
+        """Forget the plan and the estimates: the next step makes a first one."""
         self._plan = self._prepared = None
+        self._estimates |= self._modelled
         self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
 
     def run(
