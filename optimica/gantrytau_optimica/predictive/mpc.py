@@ -56,11 +56,9 @@ class Mpc:
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
     disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
-    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
-    objective is least at the set point (Pannocchia, Rawlings, 2003).
-    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
-    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
-    or [1, 1, 2, 4], the last one to the end.
+    `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
+    disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
+    2003).
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
@@ -157,9 +155,9 @@ class Mpc:
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
-        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out;
-        what was prepared before takes them a period later. What is not finite is taken as the plan foretold it, and
-        `.status` says "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
+        states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
         (x, lost), reached = self._state(measured), True
