@@ -157,7 +157,8 @@ class Mpc:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
         measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
-        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
+        states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
         (x, lost), reached = self._state(measured), True
@@ -257,11 +258,13 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
+        foretold, or kept, likewise.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
-        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+        limits = MOST, self.iterations, STANDS
+        return controller_code(self, self._yielding, self._penalty, unknown, limits, self._estimates)
 
     @property
     def held(self) -> dict[str, float]:
