@@ -258,11 +258,13 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
+        foretold, or kept, likewise.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
-        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+        limits = MOST, self.iterations, STANDS
+        return controller_code(self, self._yielding, self._penalty, unknown, limits, self._estimates)
 
     @property
     def held(self) -> dict[str, float]:
