@@ -36,6 +36,7 @@ GENERATED = (
     "messages",
     "thesis",
     "library",
+    "classics",
     "command_line",
     "sources",
     "gallery",
