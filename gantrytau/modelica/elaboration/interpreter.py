@@ -212,6 +212,8 @@ class Interpreter:
         if parts[0][0] == "":
             parts = parts[1:]
         found = here.first(parts[0][0])
+        if found is None and (known := here.imported_literal(parts[0][0])) is not None:
+            found, parts = known[0], [parts[0], (known[1], ()), *parts[1:]]
         if found is None:
             name, near = parts[0][0], [*self.local, *self.members.names(), *self.scope.known_names()]
             raise ModelError(f"found the name '{name}', expected a declared one{did_you_mean(name, near)}")

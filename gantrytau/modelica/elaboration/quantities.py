@@ -116,7 +116,10 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
         elif name in NUMBERS:
             found[name] = Bound(attribute, structure, one.shape)
         elif name in TEXTS:
-            found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
+            text = structure.folded(attribute.seen_from(structure))
+            if isinstance(text, np.ndarray):  # one for each element: kept where all are alike
+                text = text.flat[0] if len(set(text.flat)) == 1 else ""
+            found[TEXTS[name]] = text
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name in ("fixed", "free"):
