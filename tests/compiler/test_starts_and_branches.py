@@ -20,6 +20,7 @@ from gantrytau import (
     der,
     simulate,
     sin,
+    time,
     translate,
     with_setting,
 )
@@ -199,6 +200,23 @@ def test_a_start_that_moves_is_told_at_every_size(size):
 
     (moved,) = translate(Moved(), units=False).diagnosis.moved
     assert (moved.name, moved.asked, moved.found) == ("x", 2 * size, size)
+
+
+def test_equations_without_a_value_before_the_initial_ones_hold():
+    class Measured(Model):
+        """A filter whose input is divided by its output, which starts there."""
+
+        u = Real(start=1.0)
+        y = Real()
+
+        def equations(self):
+            yield self.u == 2 + sin(time)
+            yield der(self.y) == self.u / self.y - 1
+
+        def initial_equations(self):
+            yield self.y == self.u
+
+    assert translate(Measured()).start["y"] == pytest.approx(2)
 
 
 def test_an_infinite_slope_at_the_solution_is_no_obstacle_to_the_start():

@@ -12,6 +12,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.buses.expandable import expand
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
@@ -51,9 +52,8 @@ class Structure:
                 one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
-                where = self.scope.name
-                words = f"found '{name}' modified, which is protected in {where}, expected a public component"
-                one.scope.refuse(one.at, f"{words}; extend {where} to modify it")
+                words = f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component"
+                one.scope.refuse(one.at, f"{words}; extend {self.scope.name} to modify it")
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
     def has(self, name: str) -> bool:
@@ -145,20 +145,20 @@ class Structure:
         for section in self.scope.sections:
             for item in section.items:
                 ask(self, item, section.scope)
+        if self.around is None:
+            expand(self)
 
     def type_of(self, reference: tree.ComponentReference) -> str:
         one = self.leaf(reference)
         return "" if one is None else one.type_name
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
         one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
-            return None
+            return range(2)
         said = [one.full.inner.get(name) for name in ("min", "max")]
-        if None in said:
-            raise ModelError(f"found '{one.name}' by its value before, expected its min and max")
-        low, high = (int(self.folded(limit)) for limit in said if limit is not None)
-        return low, high
+        low, high = (None if limit is None else self.folded(limit) for limit in said)
+        return None if low is None or high is None else range(int(low), int(high) + 1)
 
     def is_fixed(self, expression: Any) -> bool:
         return all(map(self.is_known, references(expression)))

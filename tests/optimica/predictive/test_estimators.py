@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, cos, der, sin
-from gantrytau_optimica import ExtendedKalman, Free, MovingHorizon, Optimization
+from gantrytau import Input, Model, ModelError, Parameter, Real, Samples, cos, der, sin
+from gantrytau_optimica import Experiment, ExtendedKalman, Free, MovingHorizon, Optimization
 
 PERIOD = 0.05
 
@@ -166,6 +166,89 @@ def test_a_parameter_at_its_limit_stays_there():
         assert one.status == "estimated"
         assert found["pendulum.length"] <= 0.7
     assert found["pendulum.length"] == pytest.approx(0.7, abs=1e-6)
+
+
+def test_along_a_record_it_is_the_same():
+    y, inputs = samples(12)
+    some, times = np.isfinite(y), PERIOD * np.arange(12)
+    record = Experiment(
+        {"x": Samples(times[some], y[some])},
+        {"u": Samples(times, np.append(inputs[1:], 0.0), kind="constant")},
+    )
+    estimator = ExtendedKalman(Cart, **CART)
+    found = estimator.run(record)
+    expected = filtered(y, inputs, of_radau(PERIOD))
+    np.testing.assert_allclose(np.column_stack([found["x"], found["v"]]), expected[:, :2], atol=1e-8)
+    np.testing.assert_allclose(found.time, times)
+    for other, told in [
+        (
+            Experiment({"x": Samples(times + 0.01 * (times > 0.1), times)}, {"u": 0.0}),
+            "lies between whole periods of 0.05 s",
+        ),
+        (Experiment({"v": Samples(times, times)}, {"u": 0.0}), "v is not among what is measured, x"),
+        (Experiment({"x": Samples(times, times)}), "inputs of the experiment lack u"),
+        (Experiment({"x": Samples(times, times)}, {"u": 0.0}, {"x": 1.0}), "found start of the experiment"),
+        (record.measured, "expected Experiment"),
+    ]:
+        with pytest.raises(ModelError) as raised:
+            estimator.run(other)
+        assert told in str(raised.value)
+
+
+@pytest.mark.parametrize("size", [1e-13, 1e6])
+def test_sizes_do_not_count(size):
+    given: Any = dict(
+        measured={"x": size}, noise={"v": size}, prior={"x": size, "v": size}, start={"x": 0.0, "v": 0.0}
+    )
+    one, other = (kind(Cart, period=PERIOD, **given) for kind in (ExtendedKalman, MovingHorizon))
+    for k in range(15):
+        y, u = {"x": size * np.sin(k)}, {"u": 0.0}
+        assert other.step(y, u) == pytest.approx(one.step(y, u), abs=1e-8 * size)
+        assert other.status == "estimated"
+
+
+class Cubic(Model):
+    """A state that is seen through an equation without closed form; in bare numbers."""
+
+    gain = Parameter(1.0)
+    x, z = Real(start=1.0), Real(start=0.5)
+    u = Input()
+
+    def equations(self):
+        yield der(self.x) == self.gain * self.u - 0.1 * self.x
+        yield self.z + self.z**3 == self.x
+
+
+# a filter linearises once a sample, a horizon until nothing changes
+EXACT = pytest.mark.parametrize(("kind", "within"), [(ExtendedKalman, 0.1), (MovingHorizon, 1e-3)])
+
+
+@EXACT
+def test_a_state_is_found_through_an_implicit_equation(kind, within):
+    estimator = kind(Cubic, period=0.1, measured={"z": 1e-3}, parameters={"gain": 1.0})
+    assert estimator.observed.stages.nz == 1
+    x, found = 2.0, {}
+    for k in range(20):
+        z = next(r.real for r in np.roots([1.0, 0.0, 1.0, -x]) if abs(r.imag) < 1e-9)
+        found = estimator.step({"z": z}, {"u": 0.5})
+        assert k < 5 or found["x"] == pytest.approx(x, abs=within)
+        x = 10.0 + (x - 10.0) * np.exp(-0.1 * 0.1)  # the gain is 2
+    assert found["gain"] == pytest.approx(2.0, abs=20 * within)
+
+
+@EXACT
+def test_a_model_without_motion_has_parameters(kind, within):
+    class Spring(Model):
+        c, length, f = Parameter(1.0), Real(), Input()
+
+        def equations(self):
+            yield self.f == self.c * self.length
+
+    estimator = kind(Spring, period=0.1, measured={"length": 1e-3}, parameters={"c": 1.0})
+    found = {}
+    for k in range(20):
+        found = estimator.step({"length": k / 2.0}, {"f": float(k)})
+    assert found["c"] == pytest.approx(2.0, abs=within)
 
 
 class Unseen(Model):
