@@ -24,6 +24,7 @@ from gantrytau_fmu.code.formulas import Formulas, formulas_of
 from gantrytau_fmu.code.jumps import with_ends_of_tables
 from gantrytau_fmu.code.model_code import model_code
 from gantrytau_fmu.code.model_graph import entered
+from gantrytau_fmu.describing.description_checks import STRUCTURED
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.model_description import COMPILED, build_description, model_description
@@ -141,7 +142,7 @@ def _exported(dae: Dae, find: Sequence[str], path: str | Path, request: _Request
     contents = contents_of(graph, outputs, others)
     if request.code is not None:
         own = _own_names(request.code)
-        contents = contents.renamed(own)
+        contents = contents.renamed(own, request.code.units)
         # in log lines, too
         held = tuple(own[name] for name in graph.formulas.held)
         graph = replace(graph, formulas=replace(graph.formulas, held=held))
@@ -215,8 +216,8 @@ def _found(dae: Dae, name: str) -> str:
 
 def _around(code: SampledCode) -> Model:
     """A model with the inputs and outputs of a controller in C, which stands in the place of its sampled formulas."""
-    inputs = {f"given_{k}": Input(start=0.0, unit=code.units.get(n)) for k, n in enumerate(code.given)}
-    outputs = {f"found_{k}": Real(start=0.0, unit=code.units.get(n)) for k, n in enumerate(code.find)}
+    inputs = {f"given_{k}": Input(start=0.0) for k in range(len(code.given))}
+    outputs = {f"found_{k}": Real(start=0.0) for k in range(len(code.find))}
 
     def equations(self: Model):
         for name in outputs:
@@ -228,8 +229,10 @@ def _around(code: SampledCode) -> Model:
 
 
 def _own_names(code: SampledCode) -> dict[str, str]:
-    given = {f"given_{k}": name for k, name in enumerate(code.given)}
-    return given | {f"found_{k}": name for k, name in enumerate(code.find)}
+    """Names of the FMU's variables by those of the model around it; what is no structured name stands in apostrophes."""
+    placed = [f"given_{k}" for k in range(len(code.given))] + [f"found_{k}" for k in range(len(code.find))]
+    shown = [n if STRUCTURED.fullmatch(n) else f"'{n}'" for n in (*code.given, *code.find)]
+    return dict(zip(placed, shown, strict=True))
 
 
 def _controlled(code: SampledCode | None) -> str:

@@ -39,8 +39,8 @@ class Contents:
     structure: ModelStructure
     terminals: tuple[FmuTerminal, ...]
 
-    def renamed(self, names: Mapping[str, str]) -> "Contents":
-        """The same with other names of variables."""
+    def renamed(self, names: Mapping[str, str], units: Mapping[str, str]) -> "Contents":
+        """The same with other names of variables, and with units by these."""
 
         def known(unknown: Unknown) -> Unknown:
             on = unknown.dependencies and tuple(names.get(n, n) for n in unknown.dependencies)
@@ -52,7 +52,10 @@ class Contents:
         )
         return replace(
             self,
-            variables=tuple(replace(v, name=names.get(v.name, v.name)) for v in self.variables),
+            variables=tuple(
+                replace(v, name=names[v.name], unit=units.get(names[v.name], "")) if v.name in names else v
+                for v in self.variables
+            ),
             entries=tuple(replace(e, name=names.get(e.name, e.name)) for e in self.entries),
             structure=structure,
             terminals=(),

@@ -1,6 +1,6 @@
 """A predictive controller as C: `controller.h` and `controller.c` of its numbers, its stage function and a template."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +71,8 @@ def controller_code(
     }
     header, source = (_filled(name, told) for name in ("controller.h", "controller.c"))
     flat = mpc.built.read.dae.flat
-    units = {n: v.unit for v in flat.variables for n in v.elements if v.unit}
+    own = {*mpc.states, *mpc.inputs}
+    units = {n: v.unit for v in flat.variables for n in v.elements if v.unit and n in own}
     return SampledCode(
         name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, header=header,
         source=source,
@@ -153,7 +154,7 @@ def _rest(steady: SteadyState | None, stages: HorizonStages) -> tuple[np.ndarray
     return steady.at(0.0, start)
 
 
-def _numbers(name: str, values: np.ndarray | Sequence[float], columns: str = "") -> str:
+def _numbers(name: str, values: Any, columns: str = "") -> str:
     """A table row by row, with NAN for what is not known."""
     words = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
 

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from fmpy import extract, fmi2, fmi3, read_model_description
 
 from gantrytau import ModelError
 from gantrytau.blocks import DiscretePid
-from gantrytau_fmu import check_fmu, export_code
+from gantrytau_fmu import check_fmu, export_code, read_fmu
 from gantrytau_fmu.hardware import emulated_board, step_code
 from gantrytau_optimica import Mpc
 from tests.optimica.predictive.recorded import recorded_run
@@ -100,6 +101,15 @@ def test_a_board_runs_a_predictive_controller(controlled):
     code, states, inputs = controlled
     with emulated_board(code) as line:
         np.testing.assert_allclose([line.step(state) for state in states[:5]], inputs[:5], atol=1e-9)
+
+
+def test_names_and_units_of_the_fmu_are_those_of_the_code(tmp_path):
+    mpc = Mpc(Rest, period=PERIOD, elements=3, disturbance=["cart.u"])
+    code = replace(mpc.c_code(), units={"cart.x": "m", "cart.v": "m/s", "cart.u": "N"})
+    about = read_fmu(export_code(code, tmp_path / "controller.fmu"))
+    assert [v.unit for v in about.variables[1:]] == ["m", "m/s", "", "N", ""]
+    assert about.inputs == ("cart.x", "cart.v", "'disturbance(cart.u)'")
+    assert about.outputs == ("cart.u", "cart.brake")
 
 
 def test_single_precision_is_no_fmu(tmp_path):
