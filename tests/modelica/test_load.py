@@ -24,6 +24,7 @@ from gantrytau import (
     reinit,
     simulate,
     terminate,
+    translate,
     when,
 )
 from gantrytau.electrical import Capacitor, DcMotor, Ground, Resistor, VoltageSource
@@ -316,3 +317,12 @@ def test_a_constraint_of_a_class_modifies_what_replaces_it(tmp_path):
     found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
     values = [found.at(np.array([1.0]), f"{name}.x.y")[0] for name in ("plain", "over", "other", "own")]
     assert values == [20, 30, 20, 40]
+
+
+def test_a_derivative_whose_factor_is_evaluated_to_zero_asks_for_none(tmp_path):
+    (tmp_path / "c.mo").write_text(
+        "model C parameter Real c = 0 annotation(Evaluate=true); Real u, i;"
+        " equation u = sin(time) + abs(cos(time)); i = c * der(u); end C;"
+    )
+    made = load_modelica(tmp_path / "c.mo")["C"]
+    assert [max(translate(made(c=c)).indexed.counts) for c in (0, 2)] == [0, 1]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, load_modelica, simulate
+from gantrytau import ModelError, SolveError, load_modelica, simulate, translate
 
 GRID = """package Grids
   connector Pin
@@ -122,3 +122,107 @@ def test_a_class_extends_the_one_of_its_name_and_has_the_constants_of_the_heir(t
     assert simulate(library["Media.Chosen"](), stop=1.0).final("twice") == 18
     with pytest.raises(ModelError, match="'Other' behind 'extends', expected an inherited class"):
         library["Media.Inherited"]
+
+
+INSTANTS = """package Instants
+  record Losses
+    parameter Real P = 1;
+    final parameter Real linear = 0.1 * P;
+  end Losses;
+  model Machine
+    parameter Losses losses;
+    Real heat = losses.linear + losses.P;
+  end Machine;
+  model Held "y holds what was chosen last, without min and max"
+    parameter Losses losses(P = 4);
+    Machine machine(losses = losses);
+    Boolean u[2] = {time > 1 and time < 2, time > 3 and time < 4};
+    Integer y, n(start = 0), risen(start = 0), any(start = 0);
+  initial equation
+    pre(y) = 7;
+  equation
+    y = if u[1] then 20 elseif u[2] then -300 else pre(y);
+    when change(u[1]) then
+      n = pre(n) + 1;
+    end when;
+    when edge(u[2]) then
+      risen = pre(risen) + 1;
+    end when;
+    when u then
+      any = pre(any) + 1;
+    end when;
+  end Held;
+  function after "the row behind x"
+    input Real rows[:];
+    input Real x;
+    input Integer first;
+    output Integer next;
+  protected
+    Integer n = size(rows, 1);
+  algorithm
+    next := first;
+    while next < n and x >= rows[next] loop
+      next := next + 1;
+    end while;
+  end after;
+  model Buffer
+    Integer k(start = 0), row(start = 1);
+    Real buffer[4](each start = 0, each fixed = true), table[2, 2];
+    parameter Integer shift = 0;
+    Integer place(start = 1);
+  algorithm
+    when sample(0.5, 1) then
+      k := pre(k) + 1;
+      buffer[k + shift] := 10 * k;
+      row := after({0.1, 1.1, 2.9, 9}, time, pre(row));
+    end when;
+    place := if time > 1 then 2 else 1;
+    table := {{1, 2}, {3, 4}};
+    table[place, :] := {time, 5};
+  end Buffer;
+  model Sampled
+    Integer n(start = 0), m(start = 0);
+    Real last(start = -1);
+  equation
+    when sample(-0.3, 1) then
+      n = pre(n) + 1;
+      last = time;
+    end when;
+    when sample(2, 0.5) then
+      m = pre(m) + 1;
+    end when;
+  end Sampled;
+end Instants;
+"""
+
+
+@pytest.fixture
+def instants(tmp_path):
+    (tmp_path / "instants.mo").write_text(INSTANTS)
+    return load_modelica(tmp_path / "instants.mo")
+
+
+def test_an_integer_without_limits_is_held_and_elements_change(instants):
+    result = simulate(instants["Instants.Held"](), stop=5.0)
+    assert [float(result.at(t, "y")) for t in (0.5, 1.5, 2.5, 3.5, 4.5)] == [7, 20, 20, -300, -300]
+    assert [result.final(name) for name in ("n", "risen", "any")] == [2, 1, 2]
+    assert result.final("machine.heat") == pytest.approx(4.4)  # 0.1 * 4 + 4: what is final stays
+
+
+def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(instants):
+    result = simulate(instants["Instants.Buffer"](), stop=3.0)
+    assert [result.final(f"buffer[{k}]") for k in (1, 2, 3, 4)] == [10, 20, 30, 0]
+    assert [float(result.at(t, "row")) for t in (0.7, 1.7, 2.7)] == [2, 3, 3]
+    assert [float(result.at(0.5, name)) for name in ("table[1,1]", "table[2,2]")] == [0.5, 4]
+    assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
+    with pytest.raises(SolveError):
+        simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants):
+    found = [simulate(instants["Instants.Sampled"](), start=t, stop=t + 1.5) for t in (0.0, 0.7, 2.1)]
+    assert [(one.final("n"), round(one.final("last"), 9), one.final("m")) for one in found] == [
+        (1, 0.7, 0), (2, 1.7, 1), (1, 2.7, 3),
+    ]  # fmt: skip
+    text = translate(instants["Instants.Sampled"](), events=True).equations("base-modelica")
+    assert all(words in text for words in ("sample(-0.3, 1)", "sample(2, 0.5)"))

@@ -19,7 +19,7 @@ from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
-from gantrytau.modelica.records.assigned import chosen_value, with_part
+from gantrytau.modelica.records.assigned import chosen_value, most_rounds, with_part
 from gantrytau.modelica.records.operators import function_for
 from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import Members, holding, references
@@ -97,7 +97,7 @@ class Execution:
                         self._check_shape(name, one)
                     found = with_part(self.known[name], target.parts, one, reader)
                     for gone in self.left.values():
-                        found = found if gone is False else chosen_value(gone, self.known[name], found, name)
+                        found = found if gone is False else chosen_value(gone, self.known[name], found)
                     self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
@@ -159,10 +159,8 @@ class Execution:
             reader = replace(self.reader, local={**self.reader.local, **self.known, **local})
             test = reader.value(item.condition)
             if isinstance(test, ca.SX):
-                reader.scope.refuse(
-                    item.at,
-                    "found a loop whose length varies, expected 'for' over what is known",
-                )
+                self._unrolled(item, reader, local)
+                return
             if not test:
                 return
             try:
@@ -172,6 +170,18 @@ class Execution:
                     raise
                 return
         self.reader.scope.refuse(item.at, f"found a loop of {MOST_ROUNDS} rounds, expected one that ends")
+
+    def _unrolled(self, item: tree.WhileLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        """A `while` of varying length: as many conditions on what it does as it has rounds at most."""
+        count = most_rounds(item, reader)
+        if count is None:
+            words = "found a loop whose length varies, expected 'while i < n' with a known n, a subscript i, and i := i + 1"
+            reader.scope.refuse(item.at, words)
+        once = tree.Branching(item.at, None, None, "if", ((item.condition, item.items),), None)
+        outer = self.left["break"]
+        for _ in range(count):
+            self.run([once], local)
+        self.left["break"] = outer
 
     def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
         """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
@@ -184,10 +194,8 @@ class Execution:
         for test, items in reversed(tests):
             other, left = self.known, self.left
             self._carry_out(items, local, before, gone)
-            self.known = {
-                name: chosen_value(test, one, other[name], name) for name, one in self.known.items()
-            }
-            self.left = {word: chosen_value(test, one, left[word], word) for word, one in self.left.items()}
+            self.known = {name: chosen_value(test, one, other[name]) for name, one in self.known.items()}
+            self.left = {word: chosen_value(test, one, left[word]) for word, one in self.left.items()}
         for word in (word for word, one in self.left.items() if one is True):
             self.left = gone
             raise LeftBlock(word)

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean, in_words
 from gantrytau.language.functions import logic_or
-from gantrytau.language.symbols import pre, time
+from gantrytau.language.symbols import time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Element
@@ -18,7 +18,7 @@ from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
 from gantrytau.modelica.records.operators import operated
 from gantrytau.modelica.records.record_values import RecordValue
-from gantrytau.modelica.references import Members, called_function, component_of, dotted, function_name
+from gantrytau.modelica.references import Members, called_function, component_of, function_name, whole_name
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -50,14 +50,10 @@ def changed(new: Any, old: Any) -> Any:
 
 def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
     """The components of a list, or of lists in it, at the places of each dimension."""
-    if not places:
-        return components
     place, *rest = places
-    return (
-        _elements(components[place], rest)
-        if isinstance(place, int)
-        else [_elements(components[k], rest) for k in place]
-    )
+    many = [place] if isinstance(place, int) else place
+    found = [_elements(components[k], rest) if rest else components[k] for k in many]
+    return found[0] if isinstance(place, int) else found
 
 
 def first_result(value: Any) -> Any:
@@ -216,6 +212,8 @@ class Interpreter:
         if parts[0][0] == "":
             parts = parts[1:]
         found = here.first(parts[0][0])
+        if found is None and (known := here.imported_literal(parts[0][0])) is not None:
+            found, parts = known[0], [parts[0], (known[1], ()), *parts[1:]]
         if found is None:
             name, near = parts[0][0], [*self.local, *self.members.names(), *self.scope.known_names()]
             raise ModelError(f"found the name '{name}', expected a declared one{did_you_mean(name, near)}")
@@ -269,7 +267,7 @@ class Interpreter:
         shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
-        if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
+        if isinstance(value, np.ndarray) and value.size and any(map(self.varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
@@ -278,7 +276,7 @@ class Interpreter:
             value = np.take(value, places[axis], axis=axis)
         return value
 
-    def _varies(self, subscript: tree.Expression, size: int) -> bool:
+    def varies(self, subscript: tree.Expression, size: int) -> bool:
         """Whether a subscript is known while a model runs only."""
         if isinstance(subscript, (tree.Mark, tree.Number)):
             return False
@@ -288,7 +286,7 @@ class Interpreter:
     def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
         """The elements of an array at places of which some vary; beyond the array no number, which ends a run."""
         (first, *rest), size = subscripts, len(value)
-        if not self._varies(first, size):
+        if not self.varies(first, size):
             chosen = self.places(first, size)
             each = [self.indexed(value[k], rest) for k in ([chosen] if isinstance(chosen, int) else chosen)]
             return each[0] if isinstance(chosen, int) else values.array(each)
@@ -340,7 +338,7 @@ class Interpreter:
             return found
         if name == "initial":
             return self.members.next_sample(e) > 0.5
-        if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
+        if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = called_function(e, self)
         arguments = [inner.value(one) for one in e.arguments]
@@ -355,17 +353,19 @@ class Interpreter:
 
     def _before(self, asked: str, e: tree.Expression) -> Any:
         """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""
-        name = dotted(e)
+        name = whole_name(e)
         inside = self.following is not None and name in self.following
         old = self.members.before(name, "edge" if inside else asked) if name else None
         if self.settled and (asked == "pre" or old is None):
             return self.value(e) if asked == "pre" else False
         if old is None:
             return None
-        old, new = old if self.following is None else pre(old), self.value(e)
+        old = self.indexed(old, cast(tree.ComponentReference, e).parts[-1][1])
+        old, new = old if self.following is None else values.called("pre", [old], {}), self.value(e)
         if asked == "pre":
             return old
-        return new > old + 0.5 if asked == "edge" else changed(new, old)
+        test = changed if asked == "change" else lambda a, b: a > b + 0.5
+        return np.frompyfunc(test, 2, 1)(new, old) if isinstance(new, np.ndarray) else test(new, old)
 
     def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
         """The sizes of a component by its plain name, which say nothing of its value; None for all else."""

@@ -185,6 +185,8 @@ def merged(above: Modifier, below: Modifier) -> Modifier:
     """One modification over another, which stands further in; ModelError where the inner one is final."""
     if below is NOTHING:
         return above
+    if below.final and any(isinstance(step, str) for step in above.path):
+        return below  # a member that has its value whatever that of the whole record is
     if below.final and (above.value is not None or above.redeclared or above.inner):
         above.scope.refuse(above.at, "found a modification of what is declared 'final', expected none")
     inner = dict(below.inner)

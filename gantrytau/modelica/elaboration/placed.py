@@ -81,15 +81,18 @@ class PlacedMembers:
     def type_of(self, reference: tree.ComponentReference) -> str:
         return "" if self.structure is None else self.structure.type_of(reference)
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        return None if self.structure is None else self.structure.limits(reference)
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
+        return None if self.structure is None else self.structure.values_of(reference)
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
     def before(self, name: str, asked: str) -> Any:
         own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
-        return None if own else self._following(BEHIND, name)
+        found = None if own else self._following(BEHIND, name)
+        parts = tuple((part, ()) for part in name.split("."))
+        one = self.structure.leaf(tree.ComponentReference(0, parts)) if self.structure else None
+        return found if found is None or one is None else values.from_casadi(found, one.shape)
 
     def turn(self, name: str) -> Any:
         return self._following(TURN, name)

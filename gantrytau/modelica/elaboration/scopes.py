@@ -318,12 +318,15 @@ class ClassScope:
             found = owner.inherited_class(inner)
             if found is not None:
                 return found
-            if item.names != ("*",) and inner not in owner.elements:
-                self.refuse(
-                    item.at,
-                    f"found '{inner}', which {owner.name} does not have{did_you_mean(inner, owner.names())}",
-                )
+            if item.names != ("*",) and inner not in owner.elements and inner not in (owner.literals or ()):
+                hint = did_you_mean(inner, owner.names())
+                self.refuse(item.at, f"found '{inner}', which {owner.name} does not have{hint}")
         return None
+
+    def imported_literal(self, name: str) -> "tuple[ClassScope, str] | None":
+        """The enumeration and the name of its value that an import, here or further out, means by a name."""
+        found = ((one, inner) for one, inner, _ in self.imports(name) if inner in (one.literals or ()))
+        return next(found, None) or (self.around.imported_literal(name) if self.around else None)
 
     def _check_imports(self, name: str) -> None:
         """TextError where two imports of one kind, of single names or of all names, make different things of a name."""

@@ -150,15 +150,13 @@ class Structure:
         one = self.leaf(reference)
         return "" if one is None else one.type_name
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
         one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
-            return None
+            return range(2)
         said = [one.full.inner.get(name) for name in ("min", "max")]
-        if None in said:
-            raise ModelError(f"found '{one.name}' by its value before, expected its min and max")
-        low, high = (int(self.folded(limit)) for limit in said if limit is not None)
-        return low, high
+        low, high = (None if limit is None else self.folded(limit) for limit in said)
+        return None if low is None or high is None else range(int(low), int(high) + 1)
 
     def is_fixed(self, expression: Any) -> bool:
         return all(map(self.is_known, references(expression)))

@@ -59,6 +59,16 @@ class Rounds:
         """A round at a point where some conditions became true."""
         return Made(*self._at(self.jump, point, rose.astype(float)))
 
+    def not_finite(self, made: Made, discretes: Sequence[str], states: Sequence[str]) -> str:
+        """The name of a new value that is not finite; "" without one."""
+        names = [*discretes, *(states[i] for i in self.places.tolist())]
+        values = np.concatenate([made.discretes, made.states])
+        return next((n for n, value in zip(names, values, strict=True) if not np.isfinite(value)), "")
+
+    def labels(self, chosen: np.ndarray) -> list[str]:
+        """Where some whens are stated, and on what condition."""
+        return [one.label for one, some in zip(self.whens, chosen, strict=True) if some]
+
     @staticmethod
     def _at(function: AtPlaces, point: Point, *more: np.ndarray) -> list[np.ndarray]:
         x, z, t, w = point

@@ -18,7 +18,7 @@ from scipy import sparse
 
 RIDGE = 1e-10  # of the largest curvature: a flat objective leaves no input undetermined
 FAR = 1e30  # what PIQP takes for no limit
-ACCURACY = 1e-9
+ACCURACY = 1e-12  # of the inputs this leaves 1e-9
 
 
 @dataclass(frozen=True, eq=False)

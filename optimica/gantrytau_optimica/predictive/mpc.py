@@ -8,9 +8,11 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError, Result
+from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
+from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
 from gantrytau_optimica.predictive.horizon_checks import (
@@ -95,20 +97,21 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self._stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self.name = self.built.read.name
-        check_bounded(self._stages)
+        check_bounded(self.stages)
         doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
-        weight = PENALTY * self._stages.curvature if penalty is None else penalty
-        finite = np.isfinite(self._stages.rows)
-        self._moves = moves = Moves(self._stages, self.elements, rates or {}, step_penalty or {}, blocks)
-        nx = self._stages.nx + (self._stages.nu if moves.wanted else 0)
+        weight = PENALTY * self.stages.curvature if penalty is None else penalty
+        finite = np.isfinite(self.stages.rows)
+        self.moves = moves = Moves(self.stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        nx = self.stages.nx + (self.stages.nu if moves.wanted else 0)
         limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
         soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
-        self._program = HorizonProgram(self.elements, nx, self._stages.nu, soft, finite, weight)
-        self._terminal = Terminal(self._stages)
-        self._steady = SteadyState(self._stages) if terminal == "lqr" else None
+        self._penalty = weight
+        self._program = HorizonProgram(self.elements, nx, self.stages.nu, soft, finite, weight)
+        self.terminal = Terminal(self.stages)
+        self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
         self._prepared: tuple[float, Linear] | None = None
@@ -117,21 +120,21 @@ class Mpc:
         self._missed = 0
         self.status: Status | None = None
         self.softened: tuple[str, ...] = ()  # limits that the last plan passes
-        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def __repr__(self) -> str:
-        counts = f"{self._stages.nx} states, {self._stages.nu} inputs"
+        counts = f"{self.stages.nx} states, {self.stages.nu} inputs"
         return f"<Mpc {self.name}: {self.elements} periods of {self.period:g} s, {counts}>"
 
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states, all of which `step` wants."""
-        return tuple(s.name for s in self._stages.phase.states)
+        return tuple(s.name for s in self.stages.phase.states)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs that `step` gives."""
-        return tuple(s.name for s in self._stages.phase.inputs)
+        return tuple(s.name for s in self.stages.phase.inputs)
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -148,27 +151,28 @@ class Mpc:
         """All variables of the model over the horizon as planned at the last step, inputs as they are held."""
         if self._plan is None:
             raise ModelError("there is no plan before the first step", place=self.name)
-        return motion_result(self.built, self._stages, self._plan, self.period, f"{self.name}, planned")
+        return motion_result(self.built, self.stages, self._plan, self.period, f"{self.name}, planned")
 
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
         measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
-        What is not finite is taken as the plan foretold it, and `.status` says
-        "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
+        states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
-        x, lost = self._state(measured)
+        (x, lost), reached = self._state(measured), True
         if self.delay:
-            x, t = self._later(x, t), t + self.period
+            x, reached = self._later(x, t)
+            t += self.period
         before = self._plan
-        plan, solved, change = self._iterated(x, t)
+        plan, solved, change = self._iterated(x, t) if reached else (self._first(x, t), False, math.inf)
         late = before is not None and time.perf_counter() - begin > self.deadline
         kept = plan if before is None else before.shifted(t, self.period)
         self._plan = plan if solved else None if before is None else kept
         held = kept.u[0] if late or not solved else plan.u[0]
-        held = self._moves.reached(held, self._applied)
-        self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
+        held = self.moves.reached(held, self._applied)
+        self._applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
         self._missed += late
         wanting = self._converged and change >= STANDS
         words: dict[Status, bool] = {
@@ -195,7 +199,7 @@ class Mpc:
                 linear = self._linear(plan)
             found = self._solved(plan, linear, x)
             if first and found.unbounded:
-                check_plan(self._stages, plan, True)
+                check_plan(self.stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
@@ -203,7 +207,7 @@ class Mpc:
             if change < STANDS:
                 break
         if first:
-            check_plan(self._stages, plan, False)
+            check_plan(self.stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
@@ -216,12 +220,12 @@ class Mpc:
 
     def _linear(self, plan: PlannedMotion) -> Linear:
         times = plan.t + self.period * np.arange(self.elements)
-        return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
+        return self.stages.linear(plan.x[:-1], plan.w, plan.u, times)
 
     def reset(self) -> None:
         """Forget the plan: the next step makes a first one."""
         self._plan = self._prepared = None
-        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def run(
         self,
@@ -251,14 +255,23 @@ class Mpc:
         )
         return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
 
+    def c_code(self) -> SampledCode:
+        """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
+
+        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        ModelError for courses, and for terminal="lqr" with a state of rest that moves.
+        """
+        unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
+        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+
     @property
     def held(self) -> dict[str, float]:
         """The inputs that are applied now, by name."""
-        return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
+        return dict(zip(self.inputs, (self._applied * self.stages.sizes_u).tolist(), strict=True))
 
     def whole_state(self, values: Mapping[str, Any]) -> np.ndarray:
         """All states in their units, in the order of `states`; errors of `step`."""
-        return self._state(values)[0] * self._stages.sizes_x
+        return self._state(values)[0] * self.stages.sizes_x
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
@@ -271,7 +284,7 @@ class Mpc:
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
             raise ModelError(words, place=self.name)
-        x = np.array([found[name] for name in self.states], dtype=float) / self._stages.sizes_x
+        x = np.array([found[name] for name in self.states], dtype=float) / self.stages.sizes_x
         lost = not np.isfinite(x).all()
         if lost:
             if self._plan is None:
@@ -280,39 +293,42 @@ class Mpc:
             x = np.where(np.isfinite(x), x, foretold)
         return x, lost
 
-    def _later(self, x: np.ndarray, t: float) -> np.ndarray:
-        """The state a period later with the inputs held that are applied now."""
+    def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
+        """The state a period later with the inputs held that are applied now, and whether the motion goes there."""
         plan = self._first(x, t) if self._plan is None else self._plan
-        return self._stages.moved(x, plan.w[0], self._applied, t)[self._stages.last]
+        try:
+            return self.stages.moved(x, plan.w[0], self._applied, t)[self.stages.last], True
+        except ModelError:
+            return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
         """A plan to begin with: at rest, or the guess."""
-        plan = first_plan(self._stages, self.elements, x, t)
-        return plan if self._guess is None else guessed_plan(self._stages, plan, self._guess)
+        plan = first_plan(self.stages, self.elements, x, t)
+        return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
 
     def _solved(self, plan: PlannedMotion, linear: Linear, x: np.ndarray) -> Found:
-        stages = self._stages
+        stages = self.stages
         lower, upper = stages.rows
-        H, g = self._terminal.added(linear, plan)
+        H, g = self.terminal.added(linear, plan)
         P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
-        if self._steady is not None:
-            P, rest = self._steady.at(plan.t + self.elements * self.period, plan.x[-1])
+        if self.steady is not None:
+            P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
             p = P @ (plan.x[-1] - rest)
         stage = Stage(
             H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
             stages.lower_u - plan.u, stages.upper_u - plan.u,
         )  # fmt: skip
         first = x - plan.x[0]
-        if not self._moves.wanted:
+        if not self.moves.wanted:
             return self._program.solve(stage, P, p, first)
-        stage, none = self._moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
+        stage, none = self.moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
         P = np.pad(P, (0, stages.nu))
         found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
-        return self._moves.removed(found, plan.u, self._applied)
+        return self.moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
-        names = self._stages.row_names
+        names = self.stages.row_names
         if isinstance(hard, str):
             one_of("Mpc", "hard", hard, ("none", "all"))
             return np.full(len(names), hard == "none")
@@ -324,7 +340,7 @@ class Mpc:
 
     def _passed(self, found: Found) -> tuple[str, ...]:
         """Words of the soft limits, where the plan passes one."""
-        passed = zip(self._stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
+        passed = zip(self.stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 

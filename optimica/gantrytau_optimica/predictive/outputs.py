@@ -21,7 +21,7 @@ class Outputs:
         self.stages = stages
         y, t, courses = stages.symbols
         out = stages.at_point(built.expressed(names) + (0 if added is None else added))
-        both = ca.vertcat(stages.equations[stages.nx :], out)
+        both = ca.vertcat(stages.equations[stages.nx :, :], out)
         J = ca.jacobian(both, y)[:, : stages.nx + stages.nz]
         self._point = AtPlaces(ca.Function("outputs", [y, t, courses], [ca.densify(both), ca.densify(J)]))
 

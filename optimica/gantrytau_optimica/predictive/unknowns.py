@@ -75,24 +75,33 @@ def as_courses(built: Built, parameters: Iterable[str]) -> tuple[Built, dict[str
 
 
 def named_values(
-    flat: FlatModel, place: str, argument: str, given: Any, names: tuple[str, ...], finite: bool = True
+    flat: FlatModel,
+    place: str,
+    argument: str,
+    given: Any,
+    names: tuple[str, ...],
+    finite: bool = True,
+    alike: bool = False,
 ) -> dict[str, float]:
     """Values by scalar name of a mapping from names, vectors whole or by element; `names` are those allowed.
 
-    Raises ModelError for other names and for values of another shape.
+    alike: one number may stand for all elements of a vector. Raises ModelError for other names and shapes.
     """
     found: dict[str, float] = {}
     instance(place, argument, given, Mapping, "a mapping from names to values")
     for name, value in given.items():
-        elements = flat.expand(name) if isinstance(name, str) and name not in names else (name,)
+        whole = isinstance(name, str) and name not in names
+        elements = flat.expand(name) if whole else (name,)
         unknown = [one for one in elements if one not in names]
         if unknown:
             allowed = ", ".join(names) or "none: there are no such names here"
             words = f"expected some of {allowed}{meant(str(unknown[0]), names)}"
             raise ModelError(words, place=place, found=Given(argument, name))
-        shape = (len(elements),) if len(elements) > 1 else ()
-        values = array(place, name, value, shape, finite=finite)
-        found.update(zip(elements, np.ravel(values).tolist(), strict=True))
+        shapes = ([(len(elements),)] if len(elements) > 1 else []) + (
+            [()] if alike or len(elements) == 1 else []
+        )
+        values = array(place, name, value, *shapes, finite=finite)
+        found.update(zip(elements, np.broadcast_to(values, len(elements)).tolist(), strict=True))
     return found
 
 
@@ -144,17 +153,25 @@ def _disturbed(flat: FlatModel, names: list[str]) -> FlatModel:
 
 
 def _with_disturbed_outputs(read: SymbolicProblem, names: list[str]) -> SymbolicProblem:
-    """Costs and limits of the outputs among the names as they are with their disturbances."""
-    flat = read.dae.flat
-    owners = {e: v.symbol.elements()[k] for v in flat.variables for k, e in enumerate(v.elements)}
-    shown = [name for name in names if name not in read.dae.inputs]
+    """Costs and limits of the outputs among the names, and of variables equal to them, as they are with disturbances."""
+    dae, flat = read.dae, read.dae.flat
+    shown = {n: flat.vectors[disturbance_of(n)].symbol for n in names if n not in dae.inputs}
     if not shown:
         return read
-    old = ca.vertcat(*(owners[name] for name in shown))
-    new = old + ca.vertcat(*(flat.vectors[disturbance_of(name)].symbol for name in shown))
-    phases = tuple(replace(p, integrand=ca.substitute(p.integrand, old, new)) for p in read.phases)
-    rows = tuple(replace(c, expression=ca.substitute(c.expression, old, new)) for c in read.constraints)
-    points = tuple(replace(p, expression=ca.substitute(p.expression, old, new)) for p in read.points)
+    said = [p.integrand for p in read.phases]
+    said += [one.expression for one in (*read.constraints, *read.points)]
+    leaves = [leaf for leaf in ca.symvar(ca.veccat(*said)) if leaf.name() in flat.scalars]
+    old, new = [], []
+    for name, symbol in shown.items():
+        same = [leaf for leaf in leaves if ca.is_equal(dae.expression(leaf.name()), dae.expression(name), 2)]
+        old += same
+        new += [leaf + symbol for leaf in same]
+    if not old:
+        return read
+    own, other = ca.vertcat(*old), ca.vertcat(*new)
+    phases = tuple(replace(p, integrand=ca.substitute(p.integrand, own, other)) for p in read.phases)
+    rows = tuple(replace(c, expression=ca.substitute(c.expression, own, other)) for c in read.constraints)
+    points = tuple(replace(p, expression=ca.substitute(p.expression, own, other)) for p in read.points)
     return replace(read, phases=phases, constraints=rows, points=points)
 
 

@@ -168,6 +168,62 @@ def test_a_parameter_at_its_limit_stays_there():
     assert found["pendulum.length"] == pytest.approx(0.7, abs=1e-6)
 
 
+@pytest.mark.parametrize("size", [1e-13, 1e6])
+def test_sizes_do_not_count(size):
+    given: Any = dict(
+        measured={"x": size}, noise={"v": size}, prior={"x": size, "v": size}, start={"x": 0.0, "v": 0.0}
+    )
+    one, other = (kind(Cart, period=PERIOD, **given) for kind in (ExtendedKalman, MovingHorizon))
+    for k in range(15):
+        y, u = {"x": size * np.sin(k)}, {"u": 0.0}
+        assert other.step(y, u) == pytest.approx(one.step(y, u), abs=1e-8 * size)
+        assert other.status == "estimated"
+
+
+class Cubic(Model):
+    """A state that is seen through an equation without closed form; in bare numbers."""
+
+    gain = Parameter(1.0)
+    x, z = Real(start=1.0), Real(start=0.5)
+    u = Input()
+
+    def equations(self):
+        yield der(self.x) == self.gain * self.u - 0.1 * self.x
+        yield self.z + self.z**3 == self.x
+
+
+# a filter linearises once a sample, a horizon until nothing changes
+EXACT = pytest.mark.parametrize(("kind", "within"), [(ExtendedKalman, 0.1), (MovingHorizon, 1e-3)])
+
+
+@EXACT
+def test_a_state_is_found_through_an_implicit_equation(kind, within):
+    estimator = kind(Cubic, period=0.1, measured={"z": 1e-3}, parameters={"gain": 1.0})
+    assert estimator.observed.stages.nz == 1
+    x, found = 2.0, {}
+    for k in range(20):
+        z = next(r.real for r in np.roots([1.0, 0.0, 1.0, -x]) if abs(r.imag) < 1e-9)
+        found = estimator.step({"z": z}, {"u": 0.5})
+        assert k < 5 or found["x"] == pytest.approx(x, abs=within)
+        x = 10.0 + (x - 10.0) * np.exp(-0.1 * 0.1)  # the gain is 2
+    assert found["gain"] == pytest.approx(2.0, abs=20 * within)
+
+
+@EXACT
+def test_a_model_without_motion_has_parameters(kind, within):
+    class Spring(Model):
+        c, length, f = Parameter(1.0), Real(), Input()
+
+        def equations(self):
+            yield self.f == self.c * self.length
+
+    estimator = kind(Spring, period=0.1, measured={"length": 1e-3}, parameters={"c": 1.0})
+    found = {}
+    for k in range(20):
+        found = estimator.step({"length": k / 2.0}, {"f": float(k)})
+    assert found["c"] == pytest.approx(2.0, abs=within)
+
+
 class Unseen(Model):
     """Two parameters in a product, one nowhere, and a state that only decays."""
 

@@ -78,7 +78,7 @@ def test_a_plan_of_growing_blocks_costs_least_among_its_neighbours():
 
     def cost(u):
         """Of the motion that the controller's plan has with other blocks of u."""
-        stages = mpc._stages
+        stages = mpc.stages
         x = np.array([1.0, 0.3]) / stages.sizes_x
         total, w = 0.0, np.tile(x, 2)
         for k, one in enumerate(np.repeat(u, lengths)):

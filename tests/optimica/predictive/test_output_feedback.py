@@ -17,12 +17,12 @@ class Mass(Model):
     m, c, d = Parameter(1.0, min=0.1), Parameter(4.0), Parameter(2.0)
     s, v = Real(start=0.0), Real(start=0.0)
     f = Input(min=-20.0, max=20.0)
-    power = Real()
+    place = Real()
 
     def equations(self):
         yield der(self.s) == self.v
         yield self.m * der(self.v) == self.f - self.c * self.s - self.d * self.v
-        yield self.power == self.f * self.v
+        yield self.place == self.s
 
 
 class Reach(Optimization):
@@ -49,13 +49,13 @@ PLANT: Any = dict(m=1.3, c=5.0, d=1.5)
     [
         (Reach, ExtendedKalman, "mass.f", "lqr", 8.0),
         (Reach, MovingHorizon, "mass.f", None, 8.0),
-        (Reach, ExtendedKalman, "mass.s", None, 20.0),
+        (Reach, ExtendedKalman, "mass.place", None, 20.0),
         (Smoothly, ExtendedKalman, "mass.f", None, 20.0),
     ],
 )
 def test_a_disturbance_that_is_estimated_leaves_no_offset(problem, kind, name, terminal, stop):
     mpc = Mpc(problem, period=PERIOD, elements=30, disturbance=[name], terminal=terminal)
-    estimator = kind(problem, period=PERIOD, measured={"mass.s": 1e-3}, disturbance={name: 1.0})
+    estimator = kind(problem, period=PERIOD, measured={"mass.place": 1e-3}, disturbance={name: 1.0})
     loop = mpc.run(problem(mass=PLANT), stop=stop, estimator=estimator)
     assert abs(loop["mass.s"][-1] - 1.0) < 1e-6
     lacking = -1.0 if name == "mass.f" else -0.25  # the plant's spring wants 5 in the place of 4

@@ -19,7 +19,7 @@ from gantrytau_optimica.predictive.estimators.state_estimator import EstimateSta
 from gantrytau_optimica.predictive.horizon_qp import FAR, HorizonProgram, Stage
 from gantrytau_optimica.predictive.stages import Linear
 
-STANDS = 1e-9  # changes of scaled states by which iterations are done
+STANDS = 1e-7  # changes of states over their deviations by which iterations are done
 MOST = 30
 
 
@@ -134,19 +134,20 @@ class MovingHorizon(StateEstimator):
             self._programs[n] = HorizonProgram(
                 n + 1, stages.nx, stages.nx, np.zeros(rows, bool), finite, 1.0, ridge=0.0
             )
-        found = self._programs[n].solve(stage, H[-1], g[-1], np.zeros(stages.nx))
+        D = self._spread()
+        found = self._programs[n].solve(stage, D[:, None] * H[-1] * D, D * g[-1], np.zeros(stages.nx))
         if not found.solved:
             return math.nan
-        dx = found.x[1:]
+        dx = found.x[1:] * D
         if linear is not None:
             v = np.concatenate([np.ones((n, 1)), dx[:-1]], axis=1)
             self._w = self._w + np.einsum("kij,kj->ki", linear.w[:, :, : 1 + stages.nx], v)
         self._z = self._z + algebraic[..., 0] + np.einsum("kij,kj->ki", algebraic[..., 1:], dx)
         self._x = np.clip(self._x + dx, *one.bounds)
-        return float(np.abs(dx).max())
+        return float(np.abs(found.x[1:]).max())
 
     def _stage(self, H: np.ndarray, g: np.ndarray, linear: Linear | None) -> Stage:
-        """The program's stages: the arrival cost, then one for each period, in changes of nodes and in noises."""
+        """The program's stages: the arrival cost, then one for each period, nodes over `_spread`, and noises."""
         one, n, nx = self.observed, len(self._w), self.observed.stages.nx
         values, vectors = np.linalg.eigh(self._P)
         A, B, b = np.zeros((n + 1, nx, nx)), np.tile(np.diag(one.q), (n + 1, 1, 1)), np.zeros((n + 1, nx))
@@ -155,10 +156,17 @@ class MovingHorizon(StateEstimator):
             A[1:], b[1:] = linear.A, linear.b - self._x[1:]
         curved, slope = np.zeros((n + 1, 2 * nx, 2 * nx)), np.zeros((n + 1, 2 * nx))
         curved[:, nx:, nx:] = np.eye(nx)
-        curved[1:, :nx, :nx], slope[1:, :nx] = H, g
+        D = self._spread()
+        A, B, b = A * D / D[:, None], B / D[:, None], b / D
+        curved[1:, :nx, :nx], slope[1:, :nx] = D[:, None] * H * D, D * g
         some, far = self._bounded, np.full((n + 1, nx), FAR)
-        lower, upper = (ends[some] - (self._x + b)[:, some] for ends in one.bounds)
+        lower, upper = (((ends - self._x) / D - b)[:, some] for ends in one.bounds)
         return Stage(curved, slope, A, B, b, A[:, some], B[:, some], lower, upper, -far, far)
+
+    def _spread(self) -> np.ndarray:
+        """How far states may stray over the horizon, by deviations; 1 for those that are known, (nx,)."""
+        found = np.sqrt(np.diag(self._P) + len(self._x) * self.observed.q**2)
+        return np.where(found > 0.0, found, 1.0)
 
     def _state(self) -> np.ndarray:
         return self._x[-1]

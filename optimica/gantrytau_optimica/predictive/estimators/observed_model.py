@@ -43,44 +43,44 @@ class ObservedModel:
         self.place = place
         draft = with_unknowns(problem, noise.parameters, noise.disturbance, place)
         self.model_states = tuple(s.name for s in draft.problem.phases[0].states)
-        self.built = built = _as_states(draft)
-        flat, (phase,) = built.read.dae.flat, built.problem.phases
-        self.flat = flat
-        self.names = names = tuple(s.name for s in phase.states)
+        self.flat, known = (
+            draft.read.dae.flat,
+            draft.read.dae.inputs,
+        )  # known states: integrals of what is commanded
+        variables = tuple(draft.read.dae.variables)
+        draft = _as_states(draft)
+        states = draft.problem.phases[0].states
+        self.names = names = tuple(s.name for s in states)
+        measured = self._deviations("measured", noise.measured, variables)
+        if not measured:
+            raise ModelError("found nothing measured, expected {name: standard deviation}", place=place)
+        self.outputs, self.r = tuple(measured), np.array([*measured.values()])
+        wandering = self._deviations("noise", noise.process, names, least=True)
+        for name, value in self._deviations("disturbance", noise.disturbance, variables).items():
+            wandering[disturbance_of(name)] = value
+        prior = self._deviations("prior", noise.prior, names, least=True)
+        prior |= self._deviations("parameters", noise.parameters, names)
+        begin = {s.name: float(s.guess(np.zeros(1))[0]) for s in states}
+        begin |= named_values(self.flat, place, "start", start, names)
+        self.built = built = _sized(draft, {n: max(prior.get(n, 0.0), abs(begin[n])) for n in names})
+        (phase,) = built.problem.phases
         self.inputs = tuple(s.name for s in phase.inputs)
         limits = signal_limits(phase, built.problem.name)
         self.stages = stages = HorizonStages(
             replace(built.problem, phases=(replace(phase, path_limits=(), integrand=ca.SX(0.0)),)), period
         )
-        bounds = np.array([limits[name] for name in names], dtype=float).reshape(-1, 2)
-        self.bounds = bounds.T / stages.sizes_x
-        measured = self._deviations("measured", noise.measured, tuple(built.read.dae.variables))
-        if not measured:
-            raise ModelError("found nothing measured, expected {name: standard deviation}", place=place)
-        self.outputs = tuple(measured)
-        self.r = np.array([*measured.values()])
-        wandering = self._deviations("noise", noise.process, names, least=True)
-        wandering |= {
-            disturbance_of(e): value
-            for e, value in self._deviations(
-                "disturbance", noise.disturbance, built.read.dae.variables
-            ).items()
-        }
-        self.q = np.array([wandering.get(name, 0.0) for name in names]) * np.sqrt(period) / stages.sizes_x
-        prior = self._deviations("prior", noise.prior, names, least=True)
-        prior |= self._deviations("parameters", noise.parameters, names)
-        known = set(built.read.dae.inputs)  # states that are integrals of what is commanded
         sizes = dict(zip(names, stages.sizes_x, strict=True))
+        self.bounds = (
+            np.array([limits[name] for name in names], dtype=float).reshape(-1, 2).T / stages.sizes_x
+        )
+        self.q = np.array([wandering.get(n, 0.0) / sizes[n] for n in names]) * np.sqrt(period)
         self.p = np.array([prior.get(n, 0.0 if n in known else sizes[n]) / sizes[n] for n in names])
-        begin = {s.name: s.guess(np.zeros(1))[0] for s in phase.states}
-        begin |= named_values(flat, place, "start", start, names)
-        self.x0 = np.array([begin[name] for name in names], dtype=float) / stages.sizes_x
+        self.x0 = np.array([begin[n] / sizes[n] for n in names])
         for name, value, low, high in zip(names, self.x0, *self.bounds, strict=True):
             if not low <= value <= high:
                 words = f"the start of {name} lies beyond its limits"
-                raise ModelError(
-                    f"{words}, expected {low * sizes[name]:g} to {high * sizes[name]:g}", place=place
-                )
+                ends = f"{low * sizes[name]:g} to {high * sizes[name]:g}"
+                raise ModelError(f"{words}, expected {ends}", place=place)
         added = [self._disturbance(name) for name in self.outputs]
         self.shown = Outputs(built, stages, self.outputs, ca.vertcat(*added))
         self.z0 = np.array([s.guess(np.zeros(1))[0] for s in phase.algebraics]).reshape(-1) / stages.sizes_z
@@ -88,12 +88,15 @@ class ObservedModel:
     def _deviations(
         self, argument: str, given: Mapping[str, Any], names: Any, least: bool = False
     ) -> dict[str, float]:
-        """Standard deviations by scalar name, above zero, or zero as well."""
+        """Standard deviations by scalar name, above zero, or zero as well; one number stands for a whole vector."""
         limits: Any = {"least": 0.0} if least else {"above": 0.0}
-        whole: dict[str, Any] = {}
-        for name, value in named_each(self.flat, given):
-            whole[name] = number(self.place, f"{argument}[{name}]", value, **limits)
-        return named_values(self.flat, self.place, argument, whole, tuple(names))
+        found: dict[str, float] = {}
+        for name, value in given.items():
+            one = value if np.ndim(value) else number(self.place, f"{argument}[{name}]", value, **limits)
+            found |= named_values(self.flat, self.place, argument, {name: one}, tuple(names), alike=True)
+        for name, value in found.items():
+            number(self.place, f"{argument}[{name}]", value, **limits)
+        return found
 
     def _disturbance(self, name: str) -> ca.SX:
         """What is added to an output."""
@@ -105,14 +108,6 @@ class ObservedModel:
     def in_units(self, x: np.ndarray) -> dict[str, float]:
         """A scaled state by names."""
         return dict(zip(self.names, (x * self.stages.sizes_x).tolist(), strict=True))
-
-
-def named_each(flat: Any, given: Mapping[str, Any]):
-    """Pairs of a scalar name and a value; one value stands for all elements of a vector."""
-    for name, value in given.items():
-        elements = flat.expand(name)
-        values = np.broadcast_to(np.asarray(value, dtype=object), (len(elements),))
-        yield from zip(elements, values, strict=True)
 
 
 def _as_states(built: Built) -> Built:
@@ -128,6 +123,13 @@ def _as_states(built: Built) -> Built:
     ode = ca.vertcat(phase.ode, ca.SX.zeros(len(states), 1))
     phase = replace(phase, states=(*phase.states, *states), ode=ode)
     return replace(built, problem=replace(problem, phases=(phase,), free=()))
+
+
+def _sized(built: Built, least: Mapping[str, float]) -> Built:
+    """The problem with states of at least these sizes, by name."""
+    (phase,) = built.problem.phases
+    states = tuple(replace(s, nominal=max(s.nominal, least[s.name])) for s in phase.states)
+    return replace(built, problem=replace(built.problem, phases=(replace(phase, states=states),)))
 
 
 def _constant(one: FreeNumber, sizes: Mapping[str, float]) -> Signal:
