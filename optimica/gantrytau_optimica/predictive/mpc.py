@@ -87,7 +87,7 @@ class Mpc:
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
-        self._prepared: tuple[float, Linear] | None = None
+        self._prepared: tuple[PlannedMotion, Linear] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
         self._missed = 0
@@ -154,14 +154,15 @@ class Mpc:
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
         """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
         first, change = self._plan is None, math.inf
-        plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
         prepared, self._prepared = self._prepared, None
+        if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
+            plan, linear = prepared
+        else:
+            plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
+            linear = self._linear(plan)
         for k in range(MOST if first else self.iterations):
-            if k == 0 and prepared is not None and abs(prepared[0] - t) < 1e-9 * self.period:
-                linear = prepared[1]
-            else:
-                linear = self._linear(plan)
-            found = self._solved(plan, linear, x)
+            linear = self._linear(plan) if k else linear
+            found = self._program.solve(x - plan.x[0])
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
@@ -171,16 +172,29 @@ class Mpc:
         return plan, True, change
 
     def prepare(self) -> None:
-        """What can be done before the next measurement: the plan shifted by a period, and linearised."""
+        """What can be done before the next measurement: the plan shifted by a period, linearised, its program loaded."""
         begin = time.perf_counter()
         if self._plan is not None:
             plan = self._plan.shifted(self._plan.t + self.period, self.period)
-            self._prepared = plan.t, self._linear(plan)
+            self._prepared = plan, self._linear(plan)
         self._preparations.append(time.perf_counter() - begin)
 
     def _linear(self, plan: PlannedMotion) -> Linear:
-        times = plan.t + self.period * np.arange(self.elements)
-        return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
+        """The horizon linearised at a plan, its program loaded."""
+        stages, times = self._stages, plan.t + self.period * np.arange(self.elements)
+        linear = stages.linear(plan.x[:-1], plan.w, plan.u, times)
+        lower, upper = stages.rows
+        H, g = self._terminal.added(linear, plan)
+        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
+        if self._steady is not None:
+            P, rest = self._steady.at(plan.t + self.elements * self.period, plan.x[-1])
+            p = P @ (plan.x[-1] - rest)
+        stage = Stage(
+            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
+            stages.lower_u - plan.u, stages.upper_u - plan.u,
+        )  # fmt: skip
+        self._program.load(stage, P, p)
+        return linear
 
     def reset(self) -> None:
         """Forget the plan: the next step makes a first one."""
@@ -257,20 +271,6 @@ class Mpc:
         """A plan to begin with: at rest, or the guess."""
         plan = first_plan(self._stages, self.elements, x, t)
         return plan if self._guess is None else guessed_plan(self._stages, plan, self._guess)
-
-    def _solved(self, plan: PlannedMotion, linear: Linear, x: np.ndarray) -> Found:
-        stages = self._stages
-        lower, upper = stages.rows
-        H, g = self._terminal.added(linear, plan)
-        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
-        if self._steady is not None:
-            P, rest = self._steady.at(plan.t + self.elements * self.period, plan.x[-1])
-            p = P @ (plan.x[-1] - rest)
-        stage = Stage(
-            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
-            stages.lower_u - plan.u, stages.upper_u - plan.u,
-        )  # fmt: skip
-        return self._program.solve(stage, P, p, x - plan.x[0])
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
