@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -99,12 +100,12 @@ class Mpc:
         counts = f"{self._stages.nx} states, {self._stages.nu} inputs"
         return f"<Mpc {self.name}: {self.elements} periods of {self.period:g} s, {counts}>"
 
-    @property
+    @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states, all of which `step` wants."""
         return tuple(s.name for s in self._stages.phase.states)
 
-    @property
+    @cached_property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs that `step` gives."""
         return tuple(s.name for s in self._stages.phase.inputs)
@@ -236,10 +237,23 @@ class Mpc:
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
-        flat, found = self.built.read.dae.flat, {}
         instance(
             self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
         )
+        whole = [measured.get(name) for name in self.states]
+        plain = len(measured) == len(whole) and all(type(value) is float for value in whole)
+        x = np.array(whole if plain else self._named(measured), dtype=float) / self._stages.sizes_x
+        lost = not np.isfinite(x).all()
+        if lost:
+            if self._plan is None:
+                raise ModelError("the first measurement is not finite, expected numbers", place=self.name)
+            foretold = self._plan.x[0 if self.delay else 1]
+            x = np.where(np.isfinite(x), x, foretold)
+        return x, lost
+
+    def _named(self, measured: Mapping[str, Any]) -> list[float]:
+        """The elements of all states, from names of scalars and vectors."""
+        flat, found = self.built.read.dae.flat, {}
         for name, value in measured.items():
             elements = flat.expand(name)
             unknown = [one for one in elements if one not in self.states]
@@ -253,14 +267,7 @@ class Mpc:
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
             raise ModelError(words, place=self.name)
-        x = np.array([found[name] for name in self.states], dtype=float) / self._stages.sizes_x
-        lost = not np.isfinite(x).all()
-        if lost:
-            if self._plan is None:
-                raise ModelError("the first measurement is not finite, expected numbers", place=self.name)
-            foretold = self._plan.x[0 if self.delay else 1]
-            x = np.where(np.isfinite(x), x, foretold)
-        return x, lost
+        return [found[name] for name in self.states]
 
     def _later(self, x: np.ndarray, t: float) -> np.ndarray:
         """The state a period later with the inputs held that are applied now."""
