@@ -29,7 +29,7 @@ from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.read_problem import read_problem
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
-STANDS = 1e-9  # changes of scaled variables by which iterations are done
+STANDS = 1e-6  # changes of scaled inputs by which iterations are done: programs are solved to 1e-9, their flat parts less well
 PENALTY = 1e3  # times the largest curvature of the objective
 MOST = 50  # iterations of the first plan, and of `converged`
 
