@@ -29,7 +29,7 @@ from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.read_problem import read_problem
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
-STANDS = 1e-6  # changes of scaled inputs by which iterations are done: programs are solved to 1e-9, their flat parts less well
+STANDS = 1e-6  # changes of scaled inputs by which iterations are done; flat parts of a program are not solved better
 PENALTY = 1e3  # times the largest curvature of the objective
 MOST = 50  # iterations of the first plan, and of `converged`
 
@@ -196,6 +196,10 @@ class Mpc:
         )  # fmt: skip
         self._program.load(stage, P, p)
         return linear
+
+    def compiled(self) -> bool:
+        """Wait until the model is machine code, which a long run has made beside it; False without a C compiler."""
+        return self._stages.compiled()
 
     def reset(self) -> None:
         """Forget the plan: the next step makes a first one."""

@@ -220,6 +220,10 @@ class HorizonStages:
     def _at_points(self) -> AtPlaces:
         return AtPlaces(self._point)
 
+    def compiled(self) -> bool:
+        """Wait until what linearises is machine code; whether it is."""
+        return self._at_points.compiled()
+
     def moved(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
         """The unknowns of one stage (nw,) that solve its equations, from a guess; ModelError where there are none."""
         times = np.array([t])
