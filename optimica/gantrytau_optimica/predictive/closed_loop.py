@@ -21,13 +21,14 @@ class ClosedLoop(Record):
     """A closed loop, looked up by the model's names as its `result`: `loop["crane.s"]`, (times,).
 
     result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
-    its steps; cost: the integral of the problem's integrand along the motion.
+    its steps; cost: the integral of the problem's integrand along the motion; parameters: of the plant.
     """
 
     result: Result
     statuses: tuple[str, ...]
     timing: StepTimes
     cost: float
+    parameters: Mapping[str, float]
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.result[name]
@@ -104,4 +105,4 @@ def closed_loop(
         inputs.append(u)
     motion = PlannedMotion(np.array(states), np.array(unknowns), np.array(inputs), 0.0)
     found = motion_result(built, stages, motion, mpc.period, f"{mpc.name}, closed loop")
-    return ClosedLoop(found, tuple(statuses), mpc.timing, cost)
+    return ClosedLoop(found, tuple(statuses), mpc.timing, cost, dict(built.read.dae.parameter_values))
