@@ -78,7 +78,7 @@ swing = Mpc(SwingUp, period=0.05, elements=40, terminal="lqr", guess=first).run(
 print(swing)
 assert abs(swing["pole.phi"][-1]) < 0.01
 assert abs(swing["pole.f"]).max() <= 10.0
-swing.plot("pole.phi", "pole.p", "pole.f")
+swing.plot("pole.phi", "pole.p")
 
 # %% [markdown]
 # ## A crane that does not swing
@@ -89,23 +89,25 @@ swing.plot("pole.phi", "pole.p", "pole.f")
 
 # %%
 class Crane(Model):
-    """A load on a rope that a hoist shortens, under a trolley; in bare numbers."""
+    """A load on a rope that a hoist shortens, under a trolley."""
 
-    s, v = Real(start=0.0), Real(start=0.0)
-    length, rate = Real(start=4.0), Real(start=0.0)
-    phi, w = Real(start=0.0), Real(start=0.0)
-    f = Input(min=-600.0, max=600.0, nominal=100.0)
-    h = Input(min=0.0, max=2000.0, nominal=1000.0)
-    load = Parameter(120.0)
+    s, v = Real(start=0.0, unit="m"), Real(start=0.0, unit="m/s")
+    length, rate = Real(start=4.0, unit="m"), Real(start=0.0, unit="m/s")
+    phi, w = Real(start=0.0, unit="rad"), Real(start=0.0, unit="rad/s")
+    f = Input(min=-600.0, max=600.0, nominal=100.0, unit="N")
+    h = Input(min=0.0, max=2000.0, nominal=1000.0, unit="N")
+    trolley, load = Parameter(200.0, unit="kg"), Parameter(120.0, unit="kg")
+    g = Parameter(9.81, unit="m/s2")
 
     def equations(self):
-        s, c, g = sin(self.phi), cos(self.phi), 9.81
+        s, c = sin(self.phi), cos(self.phi)
         yield der(self.s) == self.v
         yield der(self.length) == self.rate
         yield der(self.phi) == self.w
-        yield 200.0 * der(self.v) == self.f + self.h * s
-        yield self.load * (der(self.rate) - self.length * self.w**2 + der(self.v) * s - g * c) == -self.h
-        yield self.length * der(self.w) + 2 * self.rate * self.w + der(self.v) * c + g * s == 0
+        yield self.trolley * der(self.v) == self.f + self.h * s
+        along = der(self.rate) - self.length * self.w**2 + der(self.v) * s - self.g * c
+        yield self.load * along == -self.h
+        yield self.length * der(self.w) + 2 * self.rate * self.w + der(self.v) * c + self.g * s == 0
 
 
 class Hoisted(Optimization):
@@ -126,7 +128,7 @@ crane = Mpc(Hoisted, period=0.1, elements=40).run(stop=9.0)
 print(crane)
 assert abs(crane["crane.phi"]).max() < 0.05 + 1e-4
 assert np.hypot(crane["crane.s"][-1] - 2.0, crane["crane.length"][-1] - 3.0) < 0.02
-crane.plot("crane.s", "crane.length", "crane.phi", "crane.f")
+crane.plot("crane.s", "crane.phi", "crane.f")
 
 # %% [markdown]
 # ## A four-bar linkage with friction
