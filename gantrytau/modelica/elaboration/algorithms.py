@@ -19,6 +19,7 @@ from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
+from gantrytau.modelica.overloaded.operators import function_for
 from gantrytau.modelica.references import Members
 
 MOST_ROUNDS = 100_000  # of a `while`
@@ -207,7 +208,8 @@ def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
     if then is None or otherwise is None:
         return None  # not yet known in one branch: told where it is asked for
     if isinstance(then, RecordValue):
-        return RecordValue({n: _chosen(test, one, otherwise[n], n) for n, one in then.items()})
+        each = {n: _chosen(test, one, otherwise[n], n) for n, one in then.items()}
+        return RecordValue(each, then.scope)
     return values.chosen(test, then, otherwise, smooth=False)
 
 
@@ -220,7 +222,7 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
         inner = parts[1][0]
         if not isinstance(old, RecordValue) or inner not in old:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
-        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
+        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)}, old.scope)
     if rest or not isinstance(old, np.ndarray):
         raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()
@@ -278,6 +280,10 @@ def called_class(
     definition = scope.definition
     if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
         scope = made
+    if definition.kind == "record" and (
+        made := function_for(scope, "constructor", (*arguments, *named.values()))
+    ):
+        return called_class(made, arguments, named, beyond, constants)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
@@ -300,7 +306,7 @@ def called_class(
             name, element, given[name] if name in given else _initial(name, element, run, name in inputs)
         )
     if record:
-        return RecordValue(run.known)
+        return RecordValue(run.known, scope)
     if external is not None:
         return _external(scope, external, run)
     try:
@@ -382,5 +388,9 @@ def _initial(name: str, element: Element, run: Execution, needed: bool) -> Any:
     if any(isinstance(one, tree.Mark) for one in sizes) or not sizes:
         kind = element.scope.find_class(element.clause.type, element.clause.at)
         members = kind.elements if kind.definition.kind == "record" else {}
-        return RecordValue(dict.fromkeys(members)) if members else None
+        given = ((n, said.inner.get(n)) for n in members)
+        known = {
+            n: one and one.value and replace(reader, scope=one.scope).value(one.value) for n, one in given
+        }
+        return RecordValue(known, kind) if members else None
     return np.empty([reader.value(one) for one in sizes], dtype=object)

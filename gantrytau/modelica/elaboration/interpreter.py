@@ -14,6 +14,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+from gantrytau.modelica.overloaded.operators import operator_record, overloaded
 from gantrytau.modelica.references import Members, dotted
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
@@ -98,13 +99,19 @@ class Interpreter:
         return self.end
 
     def _unary(self, e: tree.Unary) -> Any:
-        return values.unary(e.operator, self.value(e.operand))
+        operand = self.value(e.operand)
+        if operator_record(operand) is not None:
+            return overloaded(e.operator, [operand], self.library.call)
+        return values.unary(e.operator, operand)
 
     def _binary(self, e: tree.Binary) -> Any:
         left = self.value(e.left)
         if e.operator in ("and", "or") and left is (e.operator == "or"):
             return left  # the other side may have no value
-        return values.binary(e.operator, left, self.value(e.right))
+        right = self.value(e.right)
+        if operator_record(left) is not None or operator_record(right) is not None:
+            return overloaded(e.operator, [left, right], self.library.call)
+        return values.binary(e.operator, left, right)
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
