@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import Any, Literal
 
@@ -88,7 +89,7 @@ class Mpc:
         self._steady = SteadyState(self._stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
-        self._prepared: tuple[PlannedMotion, Linear] | None = None
+        self._prepared: tuple[PlannedMotion, Linear | None] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
         self._missed = 0
@@ -131,7 +132,8 @@ class Mpc:
         begin = time.perf_counter()
         x, lost = self._state(measured)
         if self.delay:
-            x, t = self._later(x, t), t + self.period
+            (x, foretold), t = self._later(x, t), t + self.period
+            lost |= foretold
         before = self._plan
         plan, solved, change = self._iterated(x, t)
         late = before is not None and time.perf_counter() - begin > self.deadline
@@ -153,18 +155,32 @@ class Mpc:
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
-        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
-        first, change = self._plan is None, math.inf
+        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs.
+
+        A plan that cannot go on is made anew, as the first one.
+        """
         prepared, self._prepared = self._prepared, None
-        if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
-            plan, linear = prepared
-        else:
-            plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
-            linear = self._linear(plan)
-        for k in range(MOST if first else self.iterations):
+        if self._plan is not None:
+            if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
+                plan, linear = prepared
+            else:
+                plan = self._plan.shifted(t, self.period)
+                linear = self._linear(plan)
+            found = self._improved(plan, linear, x, self.iterations)
+            if found[1]:
+                return found
+        first = self._first(x, t)
+        return self._improved(first, self._linear(first), x, MOST)
+
+    def _improved(
+        self, plan: PlannedMotion, linear: Linear | None, x: np.ndarray, most: int
+    ) -> tuple[PlannedMotion, bool, float]:
+        """A plan after at most so many iterations, as `_iterated`; linear: at the plan, its program loaded."""
+        change = math.inf
+        for k in range(most):
             linear = self._linear(plan) if k else linear
-            found = self._program.solve(x - plan.x[0])
-            if not found.solved:
+            found = None if linear is None else self._program.solve(x - plan.x[0])
+            if linear is None or found is None or not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
             self.softened = self._passed(found)
@@ -180,10 +196,12 @@ class Mpc:
             self._prepared = plan, self._linear(plan)
         self._preparations.append(time.perf_counter() - begin)
 
-    def _linear(self, plan: PlannedMotion) -> Linear:
-        """The horizon linearised at a plan, its program loaded."""
+    def _linear(self, plan: PlannedMotion) -> Linear | None:
+        """The horizon linearised at a plan, its program loaded; None where a number is not finite."""
         stages, times = self._stages, plan.t + self.period * np.arange(self.elements)
         linear = stages.linear(plan.x[:-1], plan.w, plan.u, times)
+        if linear is None:
+            return None
         lower, upper = stages.rows
         H, g = self._terminal.added(linear, plan)
         P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
@@ -273,10 +291,15 @@ class Mpc:
             raise ModelError(words, place=self.name)
         return [found[name] for name in self.states]
 
-    def _later(self, x: np.ndarray, t: float) -> np.ndarray:
-        """The state a period later with the inputs held that are applied now."""
-        plan = self._first(x, t) if self._plan is None else self._plan
-        return self._stages.moved(x, plan.w[0], self._applied, t)[self._stages.last]
+    def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
+        """The state a period later with the inputs held that are applied now, and whether only the plan tells it."""
+        begins = [self._first(x, t)] if self._plan is None else [self._plan, self._first(x, t)]
+        for begin in begins:
+            with suppress(ModelError):
+                return self._stages.moved(x, begin.w[0], self._applied, t)[self._stages.last], False
+        if self._plan is None:
+            raise ModelError("the motion from the first measurement has no solution", place=self.name)
+        return self._plan.x[1], True
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
         """A plan to begin with: at rest, or the guess."""

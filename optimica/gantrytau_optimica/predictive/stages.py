@@ -160,8 +160,20 @@ class HorizonStages:
         n = len(u)
         return np.concatenate([w.reshape(n, 2, -1), np.repeat(u[:, None], 2, axis=1)], axis=2)
 
-    def linear(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear:
-        """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s."""
+    def linear(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear | None:
+        """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s.
+
+        None where a number is not finite, or equations are singular.
+        """
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                found = self._linear(x, w, u, times)
+        except np.linalg.LinAlgError:
+            return None
+        numbers = (found.w, found.H, found.g, found.C, found.D, found.r)
+        return found if all(np.isfinite(one).all() for one in numbers) else None
+
+    def _linear(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear:
         n, nx, nz, nu = len(u), self.nx, self.nz, self.nu
         y, t = self.points(w, u), times[:, None] + self.step * NODES
         found = self._at_points(y.reshape(2 * n, -1), t.ravel(), self.course_values(t.ravel()).T)
@@ -229,10 +241,10 @@ class HorizonStages:
         times = np.array([t])
         for _ in range(TURNS):
             linear = self.linear(x[None], w[None], u[None], times)
+            if linear is None:
+                break
             change = linear.w[0, :, 0]
             w = w + change
-            if not np.isfinite(change).all():
-                break
             if np.max(np.abs(change), initial=0.0) < SETTLED:
                 return w
         raise ModelError(

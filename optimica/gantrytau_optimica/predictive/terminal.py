@@ -119,11 +119,11 @@ class SteadyState:
         stages, nx, nu = self.stages, self.stages.nx, self.stages.nu
         for _ in range(TURNS):
             linear = stages.linear(x[None], w[None], u[None], np.array([t]))
+            if linear is None:
+                return None
             E = np.hstack([linear.A[0] - np.eye(nx), linear.B[0]])
             K = np.block([[linear.H[0], E.T], [E, np.zeros((nx, nx))]])
             right = -np.concatenate([linear.g[0], linear.b[0] - x])
-            if not np.isfinite(K).all():
-                return None
             v = np.linalg.lstsq(K, right, rcond=None)[0][: nx + nu]
             w = w + linear.w[0] @ np.append(1.0, v)
             x, u = x + v[:nx], u + v[nx:]
