@@ -157,7 +157,7 @@ class Mpc:
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
         """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs.
 
-        A plan that cannot go on is made anew, as the first one.
+        A plan that cannot go on, or is no motion of the model, is made anew as the first one.
         """
         prepared, self._prepared = self._prepared, None
         if self._plan is not None:
@@ -166,9 +166,11 @@ class Mpc:
             else:
                 plan = self._plan.shifted(t, self.period)
                 linear = self._linear(plan)
-            found = self._improved(plan, linear, x, self.iterations)
-            if found[1]:
-                return found
+            # how far the unknowns are from solving their equations, beside what they are
+            if linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max():
+                found = self._improved(plan, linear, x, self.iterations)
+                if found[1]:
+                    return found
         first = self._first(x, t)
         return self._improved(first, self._linear(first), x, MOST)
 
