@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -21,7 +22,7 @@ from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, St
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.flattening.instants import Events, read_delays, read_events, sides, with_sides, with_starts
 from gantrytau.flattening.loop_closures import Closure
-from gantrytau.flattening.propagation import Spread, Tree, spanning_tree
+from gantrytau.flattening.propagation import Spread, Tree, defining, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
 from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
@@ -30,7 +31,16 @@ from gantrytau.language.model import Model
 from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.self_description.appearance import Shape, shapes_of
 from gantrytau.language.self_description.rods import rods_of
-from gantrytau.language.statements import Branch, Connection, Equation, Requirement, Root, equality, place_of
+from gantrytau.language.statements import (
+    Branch,
+    Connection,
+    Equation,
+    OfTheTree,
+    Requirement,
+    Root,
+    equality,
+    place_of,
+)
 from gantrytau.language.symbols import Range, Symbols, scalars, time, writing
 from gantrytau.progress import stage
 
@@ -56,6 +66,35 @@ class _Stated:
     whens: list[tuple[str, str, int, WhenChain]] = field(default_factory=list)
     transitions: list[tuple[str, str, int, Transition]] = field(default_factory=list)
     modes: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    later: list[tuple[str, str, int, OfTheTree, bool]] = field(default_factory=list)
+
+    def take(self, path: str, name: str, number: int, statement: Any, initial: bool = False) -> None:
+        """Sort in a statement of a component."""
+        if isinstance(statement, OfTheTree):
+            self.later.append((path, name, number, statement, initial))
+        elif initial:
+            self.initial += equality(statement, path, name, number)
+        elif isinstance(statement, Connection):
+            self.connections.append((path, statement))
+        elif isinstance(statement, Requirement):
+            self.requirements.append(replace(statement, path=path, model=name))
+        elif isinstance(statement, (Sampling, Sticking)):
+            self.events.append((path, name, number, statement))
+        elif isinstance(statement, WhenChain):
+            self.whens.append((path, name, number, statement))
+        elif isinstance(statement, Transition):
+            self.transitions.append((path, name, number, statement))
+        elif isinstance(statement, (Branch, Root)):
+            self.ways.append((path, name, number, statement))
+        else:
+            self.equations += equality(statement, path, name, number)
+
+    def take_later(self, instance: Instance, tree: Tree) -> None:
+        """Sort in what depends on the spanning tree."""
+        for path, name, number, asked, initial in self.later:  # grows where a statement asks again
+            found = partial(asked.statements, tree.answer(instance.path(asked.connector), asked.only_root))
+            for _, statement in _statements(found, path, name, number):
+                self.take(path, name, number, statement, initial)
 
 
 def _stated(instance: Instance) -> _Stated:
@@ -63,23 +102,10 @@ def _stated(instance: Instance) -> _Stated:
     for path, component in instance.components:
         name = type(component).__name__
         for number, statement in _statements(component.equations, path, name):
-            if isinstance(statement, Connection):
-                found.connections.append((path, statement))
-            elif isinstance(statement, Requirement):
-                found.requirements.append(replace(statement, path=path, model=name))
-            elif isinstance(statement, (Sampling, Sticking)):
-                found.events.append((path, name, number, statement))
-            elif isinstance(statement, WhenChain):
-                found.whens.append((path, name, number, statement))
-            elif isinstance(statement, Transition):
-                found.transitions.append((path, name, number, statement))
-            elif isinstance(statement, (Branch, Root)):
-                found.ways.append((path, name, number, statement))
-            else:
-                found.equations += equality(statement, path, name, number)
+            found.take(path, name, number, statement)
         ranges = tuple(instance.symbols.ranges)
         for number, statement in _statements(component.initial_equations, path, name):
-            found.initial += equality(statement, path, name, number)
+            found.take(path, name, number, statement, initial=True)
         instance.symbols.ranges[:] = ranges  # what is asked at the start alone is not watched
     samplings, chains, found.modes = read_transitions(found.transitions, instance)
     found.events += samplings
@@ -87,21 +113,30 @@ def _stated(instance: Instance) -> _Stated:
     return found
 
 
+def _tree_of(stated: _Stated, instance: Instance) -> Tree:
+    """The spanning tree of the connectors; what depends on it joins the other statements."""
+    branches = [way for *_, way in stated.ways if isinstance(way, Branch)]
+    roots = [way for *_, way in stated.ways if isinstance(way, Root)]
+    tree = spanning_tree(instance, stated.connections, branches, roots)
+    stated.take_later(instance, tree)
+    return tree
+
+
 def write_out(instance: Instance) -> FlatModel:
     """The flat record of an instantiated model."""
     with writing(instance.symbols):
         stated = _stated(instance)
         equations, connections = stated.equations, stated.connections
-        statements = [way for *_, way in stated.ways]
-        branches = [way for way in statements if isinstance(way, Branch)]
-        roots = [way for way in statements if isinstance(way, Root)]
-        tree = spanning_tree(instance, connections, branches, roots)
+        tree = _tree_of(stated, instance)
+        passed_on = defining(instance, tree, equations)
+        used = {id(one) for one, _ in passed_on.values()}
+        equations = [one for one in equations if id(one) not in used]
         equations += [*_of_the_ways(stated.ways, tree), *_bindings(instance)]
         joined = [c for c in connections if id(c[1]) not in tree.repeated]
         closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
         equations += connection_equations(instance, joined, closures)
         equations += [e for closure in closures for e in closure.equations]
-        spread = Spread(instance, tree)
+        spread = Spread(instance, tree, passed_on)
         written, written_initial = spread.substituted(equations), spread.substituted(stated.initial)
         events, sampled, frictions, whens, right = _events(stated, instance, spread)
         everything = (*written, *written_initial, *right)
@@ -110,7 +145,7 @@ def write_out(instance: Instance) -> FlatModel:
         refuse_tables(everything)
         refuse_nan(everything)
         spread.refuse_undefined(everything, names)
-        absent = _absent(statements, tree)
+        absent = _absent([way for *_, way in stated.ways], tree)
         refuse_absent(everything, names, absent)
         refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
@@ -230,10 +265,12 @@ def _is_parameter(placed: Placed) -> bool:
     return isinstance(placed.declaration, Parameter)
 
 
-def _statements(generate: Callable[[], Iterable[Any]], path: str, model: str) -> Iterator[tuple[int, Any]]:
+def _statements(
+    generate: Callable[[], Iterable[Any]], path: str, model: str, number: int = 0
+) -> Iterator[tuple[int, Any]]:
     """Numbered statements of a component; an error on the way is told with the place where it happened."""
-    within, number, end = path or "the model", 0, object()
-    generator: Iterator[Any] = told(place_of(path, model, 1), lambda: iter(generate()), within)
+    within, end = path or "the model", object()
+    generator: Iterator[Any] = told(place_of(path, model, number + 1), lambda: iter(generate()), within)
     while True:
         statement = told(place_of(path, model, number + 1), lambda: next(generator, end), within)
         if statement is end:

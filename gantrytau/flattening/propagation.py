@@ -7,6 +7,7 @@ connections, then branches that may be cut. A connection that is left over close
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -15,7 +16,8 @@ from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.flattening.flat_checks import first_with
 from gantrytau.flattening.flat_model import Loop
 from gantrytau.flattening.instantiation import Instance
-from gantrytau.language.model import Connector
+from gantrytau.language.model import Connector, Model
+from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.statements import Branch, Connection, Equation, Root
 from gantrytau.language.symbols import scalars, split_derivative
 
@@ -42,6 +44,12 @@ class Tree:
     closing: tuple[tuple[tuple[str, Connection], Loop], ...]
     repeated: frozenset[int]  # ids of connections that say what others say
 
+    def answer(self, path: str, only_root: bool) -> bool:
+        """Whether a connector is a root, or, unless only_root, nearer to the root than the other end of its branch."""
+        edges = {reached: edge for reached, edge, _ in self.reached}
+        edge = edges.get(path)
+        return path in edges and edge is None if only_root else edge is None or edge.branch is None
+
 
 def spanning_tree(
     instance: Instance,
@@ -62,7 +70,7 @@ def spanning_tree(
         and id(c.b) in instance.paths
     ]
     group, together = _Groups(), _Groups()
-    at = {instance.path(r.connector): r for r in roots if r.coordinates is None}
+    at = {instance.path(r.connector): r for r in roots if not r.optional}
     for path in list(at)[1:]:  # several roots hang on one virtual root
         group.join(path, next(iter(at)))
     tree: list[_Edge] = []
@@ -75,9 +83,9 @@ def spanning_tree(
             tree.append(edge)
         elif edge.connection is not None or edge in firm:
             closing.append(edge)
-    for candidate in roots:
+    for candidate in sorted(roots, key=lambda one: one.priority or 0):
         path = instance.path(candidate.connector)
-        if candidate.coordinates is not None and not (at and group.find(path) == group.find(next(iter(at)))):
+        if candidate.optional and not (at and group.find(path) == group.find(next(iter(at)))):
             at[path] = candidate
             group.join(path, next(iter(at)))
     reached = tuple(_from_the_roots(tree, at))
@@ -114,8 +122,47 @@ class _Groups:
 
 
 def propagated(connector: Connector) -> dict[str, Any]:
-    """The propagated quantities that a connector declares, by name."""
-    return {n: m for n, m in type(connector).members().items() if getattr(m, "kind", "") == "propagated"}
+    """The propagated quantities that a connector declares, also in records, by name."""
+    found: dict[str, Any] = {}
+    for name, member in type(connector).members().items():
+        inner = type(member).members() if isinstance(member, Model) else {}
+        found |= {name: member} | {f"{name}.{n}": m for n, m in inner.items()}
+    return {n: m for n, m in found.items() if getattr(m, "kind", "") == "propagated"}
+
+
+def symbol_of(connector: Any, name: str) -> Any:
+    """The symbol of a quantity of a connector, or of a record in it."""
+    return reduce(getattr, name.split("."), connector)
+
+
+def defining(
+    instance: Instance, tree: Tree, equations: Sequence[Equation]
+) -> dict[str, tuple[Equation, ca.SX]]:
+    """The equations that say what is passed on by branches and roots without values of their own, by scalar name.
+
+    Each has a lone symbol on one side; on the other one stand quantities only of connectors that are nearer to the root.
+    """
+    lone: dict[str, list[tuple[Equation, ca.SX]]] = {}
+    for one in equations:
+        for side, other in ((one.left, one.right), (one.right, one.left)):
+            symbol = instance.symbols.find(side)
+            if symbol is not None and symbol.kind == "propagated" and not symbol.order:
+                lone.setdefault(symbol.name, []).append((one, other))
+    names = {
+        p: [(n, s.name()) for n in propagated(c) for s in scalars(symbol_of(c, n))]
+        for p, c in tree.nodes.items()
+    }
+    open_names = {name for each in names.values() for _, name in each}
+    found: dict[str, tuple[Equation, ca.SX]] = {}
+    for path, edge, root in tree.reached:
+        given = _given(path, tree.nodes[path], edge, root, instance, tree)
+        for whole, name in names[path]:
+            own = () if whole in given else lone.get(name, ())
+            known = (each for each in own if open_names.isdisjoint(leaf_names([each[1]])))
+            if (first := next(known, None)) is not None:
+                found[name] = first
+            open_names.discard(name)
+    return found
 
 
 def _from_the_roots(
@@ -153,7 +200,9 @@ def _round(instance: Instance, closing: _Edge, way: Mapping[str, _Edge | None]) 
     return tuple(dict.fromkeys(owners[path] for path in paths if owners[path]))
 
 
-def propagate(instance: Instance, tree: Tree) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
+def propagate(
+    instance: Instance, tree: Tree, stated: Mapping[str, tuple[Equation, ca.SX]]
+) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
     """What propagated scalars are: those equal to a number or another symbol, and the expressions of the others.
 
     Both by name, in an order in which each comes after those it needs. Quantities that no root reaches
@@ -165,11 +214,21 @@ def propagate(instance: Instance, tree: Tree) -> tuple[dict[str, ca.SX], dict[st
         connector = tree.nodes[path]
         given = _given(path, connector, edge, root, instance, tree)
         for name, declaration in propagated(connector).items():
-            value = given.get(name, declaration.start)
-            elements, symbols = scalars(value), scalars(getattr(connector, name))
+            symbols = scalars(symbol_of(connector, name))
+            value, own = (
+                given.get(name, declaration.start),
+                [stated[s.name()][1] for s in symbols if s.name() in stated],
+            )
+            if value is None and len(own) < len(symbols):
+                where = "at this root" if edge is None else f"from {edge.a if path == edge.b else edge.b}"
+                raise ModelError(
+                    f"{path}: found no equation that says what {name} is {where}, expected one with {name} alone on a "
+                    "side, and on the other side what is nearer to the root"
+                )
+            elements = own if len(own) == len(symbols) else scalars(value)
             if len(elements) != len(symbols):
                 raise ModelError(
-                    f"{path}: {name} is given with shape {ca.SX(value).shape}, expected {getattr(connector, name).shape}"
+                    f"{path}: {name} is given with shape {ca.SX(value).shape}, expected {symbol_of(connector, name).shape}"
                 )
             for symbol, element in zip(symbols, _without(plain, elements), strict=True):
                 simple = element.is_constant() or element.is_symbolic()
@@ -193,9 +252,9 @@ def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, ins
         return {} if root is None else root.values
     if edge.branch is None:
         source = tree.nodes[edge.a if path == edge.b else edge.b]
-        return {name: getattr(source, name) for name in propagated(source)}
+        return {name: symbol_of(source, name) for name in propagated(source)}
     given = edge.branch.forward if path == edge.b else edge.branch.backward
-    missing = [name for name in propagated(connector) if name not in given]
+    missing = [name for name in propagated(connector) if name not in given and "." not in name]
     if missing:
         raise ModelError(
             f"branch({edge.a}, {edge.b}) says nothing of {missing[0]}, expected {', '.join(propagated(connector))} "
@@ -204,22 +263,27 @@ def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, ins
     return given
 
 
+def _holder(connector: Any, name: str) -> Any:
+    """The connector, or the record in it, that declares a quantity."""
+    return reduce(getattr, name.split(".")[:-1], connector)
+
+
 class Spread:
     """Propagated quantities of an instantiated model, and equations with the plain ones replaced.
 
     definitions: expressions by scalar name; rates: declared time derivatives of those that are not plain.
     """
 
-    def __init__(self, instance: Instance, tree: Tree):
+    def __init__(self, instance: Instance, tree: Tree, stated: Mapping[str, tuple[Equation, ca.SX]]):
         self._symbols = instance.symbols
-        self._plain, defined = propagate(instance, tree)
+        self._plain, defined = propagate(instance, tree, stated)
         self._nodes = tree.nodes
         self.rates: dict[str, ca.SX] = {}
         for connector in tree.nodes.values():
             for name, declaration in propagated(connector).items():
-                names = [s.name() for s in scalars(getattr(connector, name))]
+                names = [s.name() for s in scalars(symbol_of(connector, name))]
                 if declaration.rate is not None and any(n in defined for n in names):
-                    rate = self._inserted(ca.densify(declaration.rate(connector))).elements()
+                    rate = self._inserted(ca.densify(declaration.rate(_holder(connector, name)))).elements()
                     self.rates.update((n, r) for n, r in zip(names, rate, strict=True) if n in defined)
         self.definitions = {**self._plain, **defined}
 
@@ -258,7 +322,7 @@ class Spread:
             s.name(): path
             for path, c in self._nodes.items()
             for n in propagated(c)
-            for s in scalars(getattr(c, n))
+            for s in scalars(symbol_of(c, n))
         }
         undefined = everything.keys() - self.definitions.keys()
         if undefined and (

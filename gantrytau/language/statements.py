@@ -1,6 +1,6 @@
 """What `equations(self)` yields: equations, connections, and the branches of orientation trees."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -105,6 +105,24 @@ class Root:
     values: dict[str, Any]
     coordinates: Any = None
     equations: tuple[Any, ...] = ()
+    priority: float | None = None
+
+    @property
+    def optional(self) -> bool:
+        """Whether it is a root only where no other way leads to the connector; those of low priority come first."""
+        return self.coordinates is not None or self.priority is not None
+
+
+@dataclass(frozen=True, eq=False)
+class OfTheTree:
+    """Statements that depend on the spanning tree, as a function of an answer.
+
+    The question: whether `connector` is a root, or, unless `only_root`, nearer to the root than the other end of its branch.
+    """
+
+    connector: Any
+    only_root: bool
+    statements: Callable[[bool], Iterable[Any]]
 
 
 def connect(a: Any, b: Any) -> Connection:

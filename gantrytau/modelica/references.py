@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
+from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 
 
@@ -27,9 +28,48 @@ def dotted(e: Any) -> str:
     return ".".join(name for name, _ in e.parts) if named else ""
 
 
+def whole_name(e: Any) -> str:
+    """The name of a reference without the subscripts at its end, with dots; "" for another expression."""
+    if not isinstance(e, tree.ComponentReference):
+        return ""
+    return dotted(replace(e, parts=(*e.parts[:-1], (e.parts[-1][0], ()))))
+
+
 def references(expression: Any) -> list[tree.ComponentReference]:
     """The references in an expression, but for names of functions."""
     return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
+
+
+def function_name(call: tree.Call) -> str:
+    """The name of the function of a call, with dots."""
+    return ".".join(part for part, _ in call.function.parts)
+
+
+def called_function(call: tree.Call, reader: Any) -> tuple[str, Any]:
+    """The name of the function that is called, and its class; None for one of the language."""
+    name = function_name(call)
+    if name.startswith("Connections."):
+        return name, None
+    if (component := component_of(call, reader)) is not None:
+        owner, last = component.scope, name.rpartition(".")[2]
+        if (found := owner.inherited_class(last)) is None:
+            raise ModelError(
+                f"found '{name}', expected a function of {owner.name}{did_you_mean(last, owner.names())}"
+            )
+        return name, found
+    start, first = (reader.scope.root, name[1:]) if name.startswith(".") else (reader.scope, name)
+    found = None if name in ("der", "pure", "initial") else start.first(first.split(".")[0])
+    if "." not in first and (found is None or found.predefined):
+        return first, None
+    return name, reader.scope.find_class(name, call.at)
+
+
+def component_of(call: tree.Call, reader: Any) -> Any:
+    """The component whose class has the function that is called, as `world` of `world.gravity(r)`; None without one."""
+    *path, _ = call.function.parts
+    if not path or path[0][0] in reader.local or not reader.members.has(path[0][0]):
+        return None
+    return reader.value(replace(call.function, parts=tuple(path)))
 
 
 def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
@@ -45,6 +85,14 @@ def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
         elif isinstance(one, tree.ConnectEquation):
             found.append(one)
     return tuple(found)
+
+
+def holding(members: Any, found: Iterable[tree.ComponentReference]) -> Any:
+    """The instance, or the next around it, that has a component for one of the references; None without one."""
+    names = [one.parts[0][0] for one in found]
+    while members is not None and not any(map(members.has, names)):
+        members = members.around
+    return members
 
 
 class Members(Protocol):
@@ -82,8 +130,8 @@ class Members(Protocol):
         """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
         ...
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        """The least and the greatest value of an Integer; None for a Boolean."""
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
+        """The values of an Integer with min and max, 0 and 1 of a Boolean; None for another Integer."""
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         """Whether it holds parameters and constants only."""

@@ -5,7 +5,7 @@ from typing import Any
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import tree
-from gantrytau.modelica.references import nodes_of, references
+from gantrytau.modelica.references import called_function, nodes_of, references
 
 SIZES: Mapping[str, int] = {"zeros": 0, "ones": 0, "fill": 1, "identity": 0, "linspace": 2}
 
@@ -34,7 +34,9 @@ def ask(
 
 def ask_for_shapes(structure: Any, item: Any, scope: Any, local: frozenset[str] = frozenset()) -> None:
     """Fold the parameters in ranges, subscripts, sizes and arguments of an expression."""
-    for one in shaping(item, scope, lambda around, call: structure.interpreter(around).function(call)[1]):
+    for one in shaping(
+        item, scope, lambda around, call: called_function(call, structure.interpreter(around))[1]
+    ):
         before = set(structure.read)
         try:
             _ask_names(structure, one, scope, local)

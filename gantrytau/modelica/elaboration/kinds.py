@@ -8,6 +8,7 @@ import numpy as np
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
+from gantrytau.modelica.references import called_function
 
 BOOLEANS = frozenset({"edge", "change", "initial", "terminal", "sample"})
 INTEGERS = frozenset({"size", "ndims", "integer", "Integer", "cardinality"})
@@ -106,7 +107,7 @@ def _type_of_reference(e: tree.ComponentReference, reader: Interpreter) -> str:
 
 
 def _type_of_call(e: tree.Call, reader: Interpreter) -> str:
-    name, function = reader.function(e)
+    name, function = called_function(e, reader)
     if name == "Integer" and e.arguments and (found := type_of(e.arguments[0], reader)) in NOT_ENUMERATED:
         reader.scope.refuse(e.at, f"found {found} in Integer(), expected a value of an enumeration")
     if name in BOOLEANS | INTEGERS or name == "String":

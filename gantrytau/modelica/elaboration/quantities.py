@@ -24,6 +24,7 @@ from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
+from gantrytau.modelica.overdetermined.records import is_propagated, propagated_quantity
 from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
@@ -70,6 +71,9 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
         return
     words_of = one.prefixes - {"input", "output"} if one.element.protected else one.prefixes
     kind = next((made for word, made in KINDS.items() if word in words_of), Real)
+    if is_propagated(structure):
+        body[name] = propagated_quantity(name, structure, one.shape, words)
+        return
     if is_free(one) and not _is_differentiated(one):
         kind = Input
     elif kind is Input and inside_optimization(structure):
@@ -112,7 +116,10 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
         elif name in NUMBERS:
             found[name] = Bound(attribute, structure, one.shape)
         elif name in TEXTS:
-            found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
+            text = structure.folded(attribute.seen_from(structure))
+            if isinstance(text, np.ndarray):  # one for each element: kept where all are alike
+                text = text.flat[0] if len(set(text.flat)) == 1 else ""
+            found[TEXTS[name]] = text
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name in ("fixed", "free"):
@@ -160,14 +167,14 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
     for name in names:
         one = child.members.get(name)
         inner = said.of_member(name)
-        if one is None or inner is None or not one.present:
-            continue  # a class that is redeclared, or what is not there
+        if one is None or inner is None or not one.present or (said.value is not None and one.own.final):
+            continue  # a class that is redeclared, what is not there, or has its value whatever the record's is
         if one.primitive is None and not one.shape:
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
             found[name] = [
-                keywords_of(x, inner.of_element(k, len(one.children)), structure)
-                for k, x in enumerate(one.children)
+                keywords_of(x, each, structure)
+                for x, each in zip(one.children, inner.of_elements(one.shape), strict=True)
             ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, without_optimica(one, inner, False), structure)

@@ -28,7 +28,7 @@ class WithDoMpc(Mpc):
     def __init__(self, problem: Any, *, period: float, elements: int):
         super().__init__(problem, period=period, elements=elements)
         self.took: list[float] = []
-        stages, nx = self._stages, self._stages.nx
+        stages, nx = self.stages, self.stages.nx
         model: Any = Model("continuous", "SX")
         x = model.set_variable("_x", "x", (nx, 1))
         model.set_variable("_x", "spent")
@@ -74,12 +74,12 @@ class WithDoMpc(Mpc):
 
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs that do-mpc gives."""
-        x = np.append(self.whole_state(measured) / self._stages.sizes_x, 0.0)
+        x = np.append(self.whole_state(measured) / self.stages.sizes_x, 0.0)
         if not self.took:
             self._control.x0 = x
-            if self._stages.nz:
+            if self.stages.nz:
                 self._control.z0 = self._first(x[:-1], t).w[
-                    0, self._stages.nx : self._stages.nx + self._stages.nz
+                    0, self.stages.nx : self.stages.nx + self.stages.nz
                 ]
             self._control.set_initial_guess()
         begin = process_time()

@@ -20,7 +20,7 @@ class WithRockit(Mpc):
     def __init__(self, problem: Any, *, period: float, elements: int):
         super().__init__(problem, period=period, elements=elements)
         self.took: list[float] = []
-        stages = self._stages
+        stages = self.stages
         ocp: Any = Ocp(T=elements * period)  # pyright: ignore[reportArgumentType]
         x, u = ocp.state(stages.nx), ocp.control(stages.nu)
         z = ocp.algebraic(stages.nz) if stages.nz else ca.MX(0, 1)
@@ -59,14 +59,14 @@ class WithRockit(Mpc):
 
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs that rockit gives."""
-        x = self.whole_state(measured) / self._stages.sizes_x
+        x = self.whole_state(measured) / self.stages.sizes_x
         if not self.took:
             first = self._first(x, t)
             self._guess_of_plan = [first.x.T, np.zeros(self._places)]
-            self._guess_of_plan[1][: self._stages.nu] = first.u.T
+            self._guess_of_plan[1][: self.stages.nu] = first.u.T
         begin = process_time()
         self._guess_of_plan = [np.asarray(one) for one in self._solve(x, *self._guess_of_plan)]
-        self._applied = self._guess_of_plan[1][: self._stages.nu, 0]
+        self._applied = self._guess_of_plan[1][: self.stages.nu, 0]
         self.took.append(process_time() - begin)
         self.status = "solved"
         return self.held

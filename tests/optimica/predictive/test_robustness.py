@@ -51,10 +51,12 @@ def wrong(measured, rng, before):
     return measured | {name: spoilt.get(int(whole), measured[name])}
 
 
-@pytest.mark.parametrize(("problem", "keywords"), [(Upright, {}), (Upright, {"delay": 1}), (Still, {"hard": "all"})])
+@pytest.mark.parametrize(
+    ("problem", "keywords"), [(Upright, {}), (Upright, {"delay": 1}), (Still, {"hard": "all"})]
+)
 def test_wrong_measurements_never_give_inputs_beyond_their_limits(problem, keywords):
     mpc, rng, told = Mpc(problem, period=0.05, elements=15, **keywords), np.random.default_rng(3), Counter()
-    stages = mpc._stages
+    stages = mpc.stages
     x = np.array([s.guess(np.zeros(1))[0] for s in stages.phase.states]) / stages.sizes_x
     before = measured = dict(zip(mpc.states, (x * stages.sizes_x).tolist(), strict=True))
     for k in range(150):
@@ -89,4 +91,6 @@ def test_cranes_from_a_thousand_starts_keep_their_limits():
         assert set(loop.statuses) == {"solved"}
         assert np.abs(loop["crane.a"]).max() <= 0.5
         assert np.abs(loop["crane.s"]).max() <= RAIL
-        assert np.abs(loop["crane.phi"]).max() <= SWAY + 1e-4  # what integration in four steps a period differs by
+        assert (
+            np.abs(loop["crane.phi"]).max() <= SWAY + 1e-4
+        )  # what integration in four steps a period differs by

@@ -1,0 +1,1 @@
+"""Overdetermined connectors: records that are passed on along a spanning tree of the connectors, and `Connections.*`."""
