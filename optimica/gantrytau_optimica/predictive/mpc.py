@@ -206,8 +206,7 @@ class Mpc:
                 found = self._improved(plan, linear, x, self.iterations)
                 if found[1]:
                     return found
-        first = self._first(x, t)
-        return self._improved(first, self._linear(first), x, MOST)
+        return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
 
     def _improved(
         self, plan: PlannedMotion, linear: Linear | None, x: np.ndarray, most: int
@@ -263,11 +262,9 @@ class Mpc:
 
     def _solved(self, plan: PlannedMotion, x: np.ndarray) -> Found:
         """What the loaded program says from a state (nx,)."""
-        first = x - plan.x[0]
-        if not self.moves.wanted:
-            return self._program.solve(first)
-        found = self._program.solve(np.append(first, np.zeros(self.stages.nu)))
-        return self.moves.removed(found, plan.u, self._applied)
+        first, added = x - plan.x[0], self.moves.wanted
+        found = self._program.solve(np.append(first, np.zeros(self.stages.nu)) if added else first)
+        return self.moves.removed(found, plan.u, self._applied) if added else found
 
     def compiled(self) -> bool:
         """Wait until the model is machine code, which a long run has made beside it; False without a C compiler."""

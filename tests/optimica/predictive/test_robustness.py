@@ -1,4 +1,4 @@
-"""`Mpc` in a loop whose measurements are wrong, and from starts everywhere: inputs within limits, limits of the path kept."""
+"""`Mpc` in a loop whose measurements are wrong, and from starts everywhere: it keeps its limits."""
 
 from collections import Counter
 
