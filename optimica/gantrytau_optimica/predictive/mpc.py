@@ -306,7 +306,7 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        It gives the inputs of `step` without a deadline, foretells what is not finite, and makes no plan anew.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
