@@ -186,6 +186,10 @@ class Real(Quantity):
     undetermined: the likely cause where the equations do not determine it, for messages.
     """
 
+    inlined = (
+        False  # whether an equation that has it alone on a side says what it is, as of a propagated quantity
+    )
+
 
 class Input(Quantity):
     """A variable that is known from outside; the optimiser chooses it, `simulate` is given it."""

@@ -167,8 +167,19 @@ class Structure:
         """Whether a reference leads to a parameter or constant."""
         if not self.has(reference.parts[0][0]):
             return reference.parts[0][0] != "time"
-        one = self.leaf(reference)
-        return one is None or one.is_parameter
+        here: Structure | None = self
+        for name, _ in reference.parts:
+            one = here.members.get(name) if here is not None else None
+            if one is None or one.primitive is not None:
+                return one is None or one.is_parameter
+            here = one.children[0] if one.children else None
+        return here is None or here.scope.definition.kind != "record" or here.is_constant
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether all in it are parameters and constants."""
+        each = self.members.values()
+        return all(m.is_parameter if m.primitive else all(c.is_constant for c in m.children) for m in each)
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
