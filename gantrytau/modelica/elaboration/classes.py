@@ -187,6 +187,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
+        body["expandable"] = "expandable" in scope.definition.prefixes
         return type(scope.definition.name, (kind,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)
@@ -211,8 +212,6 @@ def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     if definition.kind not in kinds or "operator" in definition.prefixes:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
-    elif "expandable" in definition.prefixes:
-        found = "an expandable connector, which is not supported, expected one with declared members"
     elif streams:
         found = f"the stream variable '{streams[0]}', which is not supported, expected potentials and flows"
     elif structure.scope.is_external_object:

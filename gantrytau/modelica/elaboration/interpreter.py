@@ -246,6 +246,11 @@ class Interpreter:
             known = value.names()
             if value.has(name):
                 return value.member(name)
+            if getattr(getattr(value, "instance", None), "expandable", False):
+                words = (
+                    f"found '{name}' of an expandable connector, expected a declared member; declare it in"
+                )
+                raise ModelError(f"{words} {value.scope.name}{did_you_mean(name, known)}")
         else:
             known = ()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")

@@ -19,7 +19,7 @@ from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
 from gantrytau.modelica.references import references
-from gantrytau.modelica.shaping import ask, ask_for_shapes
+from gantrytau.modelica.shaping import ask, ask_for_shapes, is_known
 
 
 @dataclass(eq=False)
@@ -161,25 +161,7 @@ class Structure:
         return low, high
 
     def is_fixed(self, expression: Any) -> bool:
-        return all(map(self.is_known, references(expression)))
-
-    def is_known(self, reference: tree.ComponentReference) -> bool:
-        """Whether a reference leads to a parameter or constant."""
-        if not self.has(reference.parts[0][0]):
-            return reference.parts[0][0] != "time"
-        here: Structure | None = self
-        for name, _ in reference.parts:
-            one = here.members.get(name) if here is not None else None
-            if one is None or one.primitive is not None:
-                return one is None or one.is_parameter
-            here = one.children[0] if one.children else None
-        return here is None or here.scope.definition.kind != "record" or here.is_constant
-
-    @property
-    def is_constant(self) -> bool:
-        """Whether all in it are parameters and constants."""
-        each = self.members.values()
-        return all(m.is_parameter if m.primitive else all(c.is_constant for c in m.children) for m in each)
+        return all(is_known(self, one) for one in references(expression))
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
