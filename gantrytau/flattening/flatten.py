@@ -127,8 +127,7 @@ def write_out(instance: Instance) -> FlatModel:
     with writing(instance.symbols):
         stated = _stated(instance)
         equations, connections = stated.equations, stated.connections
-        tree = _tree_of(stated, instance)
-        passed_on = defining(instance, tree, equations)
+        passed_on = defining(instance, tree := _tree_of(stated, instance), equations)
         used = {id(one) for one, _ in passed_on.values()}
         equations = [one for one in equations if id(one) not in used]
         equations += [*_of_the_ways(stated.ways, tree), *_bindings(instance)]
