@@ -104,7 +104,11 @@ REFUSED = {  # statements on instants -> why they cannot be
 
 
 def refuse_events(flat: FlatModel, *kinds: str) -> None:
-    """ModelError naming the first statement on instants, of some kinds of REFUSED or of all."""
+    """ModelError naming the first statement on instants, of some kinds of REFUSED or of all.
+
+    A when that only ends the run with an error, an `assert`, sets nothing: the equations stay.
+    """
     for kind in kinds or REFUSED:
         for one in getattr(flat, kind):
-            raise ModelError(REFUSED[kind], place=one.label)
+            if not getattr(one, "failure", ""):
+                raise ModelError(REFUSED[kind], place=one.label)

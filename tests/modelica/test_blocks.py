@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import ModelError, SolveError, load_modelica, simulate
+from gantrytau import ModelError, SolveError, linearize, load_modelica, simulate
 
 
 @pytest.fixture
@@ -134,3 +134,9 @@ def test_assertions_of_a_branch_hold_where_it_acts(ran):
     assert ran(BRANCHES, 1.0).final("y") == pytest.approx(1)
     with pytest.raises((ModelError, SolveError), match="above its limit"):
         ran(BRANCHES, 1.0, most=0.5)
+
+
+def test_a_model_with_assertions_is_linearised(tmp_path):
+    text = 'model M input Real u; output Real y(start=0); equation der(y) = u - 2*y; assert(y < 1, "far"); end M;'
+    (tmp_path / "m.mo").write_text(text)
+    assert linearize(load_modelica(tmp_path / "m.mo")["M"]).poles == pytest.approx([-2])

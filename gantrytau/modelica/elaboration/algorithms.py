@@ -13,12 +13,13 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
-from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
+from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.statements import action_of, looped
 from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
+from gantrytau.modelica.overloaded.operators import function_for
 from gantrytau.modelica.references import Members, holding, references
 
 MOST_ROUNDS = 100_000  # of a `while`
@@ -134,7 +135,7 @@ class Execution:
         wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
         if not fits(wanted, kind := type_of_value(value)):
             raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
-        if not any(isinstance(one, tree.Mark) for one in sizes) and not _is_array_type(element):
+        if not any(isinstance(one, tree.Mark) for one in sizes) and not is_array_type(element):
             self.shapes[name] = tuple(reader.value(one) for one in sizes)
             if value is not None:
                 self._check_shape(name, value)
@@ -209,7 +210,8 @@ def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
     if isinstance(then, np.ndarray) and np.shape(then) == np.shape(otherwise):
         return np.frompyfunc(partial(_chosen, test, name=name), 2, 1)(then, otherwise)
     if isinstance(then, RecordValue):
-        return RecordValue({n: _chosen(test, one, otherwise[n], n) for n, one in then.items()})
+        each = {n: _chosen(test, one, otherwise[n], n) for n, one in then.items()}
+        return RecordValue(each, then.scope)
     return values.chosen(test, then, otherwise, smooth=False)
 
 
@@ -222,7 +224,7 @@ def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
         inner = parts[1][0]
         if not isinstance(old, RecordValue) or inner not in old:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
-        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)})
+        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)}, old.scope)
     if rest or not isinstance(old, np.ndarray):
         raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()
@@ -283,6 +285,10 @@ def called_class(
     definition = scope.definition
     if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
         scope = made
+    if definition.kind == "record" and (
+        made := function_for(scope, "constructor", (*arguments, *named.values()))
+    ):
+        return called_class(made, arguments, named, beyond, known)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
@@ -290,9 +296,9 @@ def called_class(
     whole = definition.kind == "record"
     inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
-    mapped = next((n for n, one in given.items() if not record and _is_longer(inputs[n], one)), None)
+    mapped = next((n for n, one in given.items() if not record and is_longer(inputs[n], one)), None)
     if mapped is not None:
-        longer = {n for n, one in given.items() if _is_longer(inputs[n], one)}
+        longer = {n for n, one in given.items() if is_longer(inputs[n], one)}
         count = range(len(given[mapped]))
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, known) for one in all_given]
@@ -306,7 +312,7 @@ def called_class(
             name, element, given[name] if name in given else _initial(element, run, holder, name in inputs)
         )
     if record:
-        return RecordValue(run.known)
+        return RecordValue(run.known, scope)
     if external is not None:
         return _external(scope, external, run)
     try:
@@ -343,29 +349,6 @@ def _is_open(value: Any) -> bool:
     return value is None or (isinstance(value, np.ndarray) and any(one is None for one in value.flat))
 
 
-def _dimensions(element: Element) -> int:
-    return len(element.declaration.subscripts) + len(element.clause.subscripts)
-
-
-def _is_longer(element: Element, value: Any) -> bool:
-    """Whether a function of scalars is given an array, of which it takes each element."""
-    return (
-        isinstance(value, np.ndarray)
-        and value.ndim == _dimensions(element) + 1
-        and not _is_array_type(element)
-    )
-
-
-def _is_array_type(element: Element) -> bool:
-    here: ClassScope | None = element.scope.find_class(element.clause.type, element.clause.at)
-    while here is not None and here.is_primitive:
-        body = here.definition.body
-        if isinstance(body, tree.ShortClass) and body.subscripts:
-            return True
-        here = here.bases[0][0] if here.bases else None
-    return False
-
-
 def _given(
     scope: ClassScope, inputs: Mapping[str, Element], arguments: Sequence[Any], named: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -396,5 +379,9 @@ def _initial(element: Element, run: Execution, holder: Members | None, needed: b
     if any(isinstance(one, tree.Mark) for one in sizes) or not sizes:
         kind = element.scope.find_class(element.clause.type, element.clause.at)
         members = kind.elements if kind.definition.kind == "record" else {}
-        return RecordValue(dict.fromkeys(members)) if members else None
+        given = ((n, said.inner.get(n)) for n in members)
+        known = {
+            n: one and one.value and replace(reader, scope=one.scope).value(one.value) for n, one in given
+        }
+        return RecordValue(known, kind) if members else None
     return np.empty([reader.value(one) for one in sizes], dtype=object)

@@ -209,7 +209,7 @@ def _is_connector(structure: Structure) -> bool:
 def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     definition, name = structure.scope.definition, structure.scope.name
     streams = [n for n, one in structure.members.items() if "stream" in one.prefixes]
-    if definition.kind not in kinds or "operator" in definition.prefixes:
+    if definition.kind not in kinds:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
     elif streams:

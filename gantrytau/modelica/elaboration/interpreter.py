@@ -15,7 +15,15 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
-from gantrytau.modelica.references import Members, called_function, component_of, dotted, function_name
+from gantrytau.modelica.overloaded.operators import operator_record, overloaded
+from gantrytau.modelica.references import (
+    Members,
+    called_function,
+    component_of,
+    declared_shape,
+    dotted,
+    function_name,
+)
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -108,13 +116,19 @@ class Interpreter:
         return self.end
 
     def _unary(self, e: tree.Unary) -> Any:
-        return values.unary(e.operator, self.value(e.operand))
+        operand = self.value(e.operand)
+        if operator_record(operand) is not None:
+            return overloaded(e.operator, [operand], self.library.call)
+        return values.unary(e.operator, operand)
 
     def _binary(self, e: tree.Binary) -> Any:
         left = self.value(e.left)
         if e.operator in ("and", "or") and left is (e.operator == "or"):
             return left  # the other side may have no value
-        return values.binary(e.operator, left, self.value(e.right))
+        right = self.value(e.right)
+        if operator_record(left) is not None or operator_record(right) is not None:
+            return overloaded(e.operator, [left, right], self.library.call)
+        return values.binary(e.operator, left, right)
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
@@ -247,10 +261,8 @@ class Interpreter:
             if value.has(name):
                 return value.member(name)
             if getattr(getattr(value, "instance", None), "expandable", False):
-                words = (
-                    f"found '{name}' of an expandable connector, expected a declared member; declare it in"
-                )
-                raise ModelError(f"{words} {value.scope.name}{did_you_mean(name, known)}")
+                words = f"expected a declared member; declare it in {value.scope.name}"
+                raise ModelError(f"found '{name}' of an expandable connector, {words}")
         else:
             known = ()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
@@ -325,19 +337,18 @@ class Interpreter:
             if name == "array":
                 return values.array(items)
             return values.called(name, [np.ravel(values.array(items))], {})
-        if name == "size" and e.arguments and (shape := self._declared_shape(e.arguments[0])) is not None:
+        if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
-        if name == "sample":
-            return time >= self.members.next_sample(e)
+        if name in ("sample", "initial"):
+            instant = self.members.next_sample(e)
+            return time >= instant if name == "sample" else instant > 0.5
         if name == "getInstanceName":
             return self.members.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
-        if name == "initial":
-            return self.members.next_sample(e) > 0.5
         if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = called_function(e, self)
@@ -364,15 +375,6 @@ class Interpreter:
         if asked == "pre":
             return old
         return new > old + 0.5 if asked == "edge" else changed(new, old)
-
-    def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
-        """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
-        if not isinstance(e, tree.ComponentReference):
-            return None
-        (name, subscripts), *rest = e.parts
-        if rest or subscripts:
-            return None
-        return self.members.shape(name) if name not in self.local and self.members.has(name) else None
 
     def _partial(self, e: tree.PartialCall) -> Any:
         raise ModelError("found a function as an argument, which is not supported, expected a value")

@@ -34,12 +34,29 @@ class EnumerationValue(int):
 
 
 class RecordValue(dict[str, Any]):
-    """The members of a record by name."""
+    """The members of a record by name; scope: the class of the record."""
+
+    def __init__(self, members: Mapping[str, Any], scope: Any = None):
+        super().__init__(members)
+        self.scope = scope
+
+
+def record_value(value: Any) -> RecordValue:
+    """A record, or a component that is one, as the values of its members."""
+    if isinstance(value, RecordValue):
+        return value
+    scope = getattr(getattr(value, "structure", None), "scope", None)
+    return RecordValue({n: value.member(n) for n in value.names()}, scope)
+
+
+def is_plain(value: Any) -> bool:
+    """Whether a value is a number, a text, an expression or an array of these."""
+    return isinstance(value, (bool, int, float, str, ca.SX, np.ndarray, np.number))
 
 
 def array(items: Sequence[Any]) -> Any:
     """Values of one shape as an array with one more dimension; components and records as a list."""
-    if any(not isinstance(one, (bool, int, float, str, ca.SX, np.ndarray, np.number)) for one in items):
+    if not all(map(is_plain, items)):
         return list(items)
     shapes = {np.shape(one) if isinstance(one, np.ndarray) else () for one in items}
     if len(shapes) > 1:
@@ -217,7 +234,10 @@ def condition(value: Any) -> Any:
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
-    """`if test then ... else ...` where the test holds symbols; arrays element by element."""
+    """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
+    if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
+        a, b = record_value(then), record_value(otherwise)
+        return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
     if isinstance(then, np.ndarray) or isinstance(otherwise, np.ndarray):
         _same_shape("else", then, otherwise)
         return array([chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)])
