@@ -6,7 +6,7 @@ VENV := .venv
 PIP := $(VENV)/bin/python -m pip --disable-pip-version-check
 LOCK := pyproject.toml constraints.txt
 
-.PHONY: demo test test-all bench library-results docs lint style types pytest clean
+.PHONY: demo test test-all bench library-results classics docs lint style types pytest clean
 
 demo: $(VENV)/installed
 	$(VENV)/bin/gantrytau demo
@@ -30,6 +30,10 @@ bench: $(VENV)/installed-bench
 # Examples of the libraries in MODELICAPATH beside the trajectories in REFERENCE_RESULTS; ONLY=Package.Of.Some.
 library-results: $(VENV)/installed-dev
 	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.library_results
+
+# Published problems of each field, beside other solvers; ONLY=Hires or a family.
+classics: $(VENV)/installed-bench
+	@OMP_NUM_THREADS=1 $(VENV)/bin/python -m tests.classics
 
 # Notebooks are executed again only where they, or the packages, have changed.
 docs: $(VENV)/installed-docs

@@ -16,6 +16,7 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.dulmage_mendelsohn import largest_sum, signature
 from gantrytau.compiler.refusals import unbalanced
 from gantrytau.compiler.start.level import Level
+from gantrytau.compiler.symbol_spaces import column
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.symbols import Derivative, derivative_name, derivatives_in, split_derivative
@@ -99,7 +100,7 @@ def reduce_index(reduced: Reduced, flat: FlatModel, wanted: Sequence[str] = ()) 
     if len(reduced.residuals) != len(reduced.unknowns):
         raise unbalanced(reduced, rows, flat)
     counts, tops = _offsets(reduced, rows, _mentioned(reduced, flat, wanted), flat)
-    residuals = _differentiated(reduced, counts)
+    residuals = _differentiated(reduced, counts, flat.discretes)
     orders = dict(zip(reduced.unknowns, (int(t) for t in tops), strict=True))
     names = tuple(e.name for e in reduced.equations)
     exact = frozenset((*reduced.table.independent, *reduced.known, flat.time.name()))
@@ -128,6 +129,8 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
     place = {name: j for j, name in enumerate(reduced.unknowns)}
     found = np.zeros(len(place), dtype=int)
     named = [*reduced.aliases, *flat.derivatives, *wanted, *_fixed_motions(reduced, flat)]
+    left_out = _without_factors(reduced, flat)
+    named = [name for name in named if name not in left_out]
     for name in wanted:
         if name in reduced.definitions:  # follows from derivatives of variables
             named += [leaf.name() for leaf in ca.symvar(reduced.definitions.reduced(name))]
@@ -136,6 +139,27 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
         alias = reduced.aliases.get(base)
         if alias is not None and alias.root in place:
             found[place[alias.root]] = max(found[place[alias.root]], alias.order + order)
+    return found
+
+
+def _without_factors(reduced: Reduced, flat: FlatModel) -> set[str]:
+    """Derivatives that only products with parameters have that are folded in and zero, as the voltage of no capacitance."""
+    if not any(p.fold for p in flat.parameters):
+        return set()
+    others = [e for w in flat.whens for e in (w.condition, *(v for _, v in (*w.reinits, *w.assignments)))]
+    others += [e.residual for e in flat.initial_equations]
+    others += [s.expression for s in (*flat.sampled, *flat.delays)]
+    stated = column([e.residual for e in flat.equations])
+    named = {leaf.name() for leaf in ca.symvar(stated)} - {leaf.name() for leaf in ca.symvar(column(others))}
+    there = {one.name for row in reduced.incidence for one in row}
+    there |= {derivative_name(a.root, a.order) for a in reduced.aliases.values() if a.root is not None}
+    found = set()
+    for name in named & flat.derivatives.keys():
+        base, order = split_derivative(name)
+        alias = reduced.aliases.get(base)
+        if alias is not None and alias.root is not None:
+            root = derivative_name(alias.root, alias.order + order)
+            found |= {name} if root not in there else set()
     return found
 
 
@@ -150,8 +174,16 @@ def _fixed_motions(reduced: Reduced, flat: FlatModel) -> list[str]:
     return [derivative_name(root, 2) for root, orders in fixed.items() if {0, 1} <= orders]
 
 
-def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
-    """Differentiated in the symbols of the definitions, where derivatives are short, and then resolved."""
+def _is_rate(name: str, of: Collection[str]) -> bool:
+    base, order = split_derivative(name)
+    return order > 0 and base in of
+
+
+def _differentiated(reduced: Reduced, counts, discretes: Collection[str]) -> dict[Key, ca.SX]:
+    """Differentiated in the symbols of the definitions, where derivatives are short, and then resolved.
+
+    discretes: names of what is constant between instants, so that its derivative is zero.
+    """
     below = dict(enumerate(reduced.compact))
     residuals: dict[Key, ca.SX] = {(i, 0): r for i, r in enumerate(reduced.residuals)}
     keys: list[Key] = []
@@ -166,5 +198,9 @@ def _differentiated(reduced: Reduced, counts) -> dict[Key, ca.SX]:
         compact += new
     if keys:
         resolved = reduced.definitions.to_reduced(ca.vertcat(*compact))
+        rates = (
+            [leaf for leaf in ca.symvar(resolved) if _is_rate(leaf.name(), discretes)] if discretes else []
+        )
+        resolved = ca.substitute(resolved, ca.vertcat(*rates), ca.SX.zeros(len(rates))) if rates else resolved
         residuals.update(zip(keys, ca.densify(resolved).elements(), strict=True))
     return residuals

@@ -133,7 +133,8 @@ class When:
     just before, but those of Discretes for new ones (`FlatModel.before` are the old ones); message: of terminate, "" if the
     run goes on; path, model, number: where it is stated; after: place in `FlatModel.whens` of the one before it in its
     chain, -1 if it is the first; words: what it is, where its condition does not say it; initially: whether it acts at the
-    start if its condition holds there; failure: words of the error that ends the run where it would act, "" if it acts.
+    start if its condition holds there; failure: words of the error that ends the run where it would act, "" if it acts;
+    waits: whether it acts only in rounds in which no when does that does not wait.
     """
 
     condition: ca.SX
@@ -147,6 +148,7 @@ class When:
     words: str = ""
     initially: bool = False
     failure: str = ""
+    waits: bool = False
 
     @property
     def label(self) -> str:

@@ -154,7 +154,7 @@ class _Growing(Instance):
                 )
             member, modification = wanted, modification.more
         if isinstance(member, Outer):
-            self.outers.append((instance, name, member, [*around, instance]))
+            self.outers.append((instance, name, member, around if member.name else [*around, instance]))
         elif isinstance(member, Array):
             common = {key: value for key, value in modification.items() if isinstance(key, str)}
             count = 1 + max((key for key in modification if isinstance(key, int)), default=-1)
@@ -162,8 +162,8 @@ class _Growing(Instance):
                 raise ModelError(
                     f"{place}: found {count} modifications, expected one for each of {len(member)}"
                 )
-            built = []
-            for index, element in enumerate(member):
+            built, places = [], member.names(place, instance.first_index)
+            for index, (place, element) in enumerate(zip(places, member, strict=True)):
                 one = modification.get(index, {})
                 here, own = scope, one
                 if isinstance(one, Leaf):
@@ -171,7 +171,7 @@ class _Growing(Instance):
                 built.append(
                     self.build(
                         element,
-                        f"{place}[{index + instance.first_index}]",
+                        place,
                         _merge(common, own),
                         here,
                         [*around, instance],

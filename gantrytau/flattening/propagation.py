@@ -135,9 +135,8 @@ def symbol_of(connector: Any, name: str) -> Any:
     return reduce(getattr, name.split("."), connector)
 
 
-Definitions = Mapping[
-    str, tuple[Equation, ca.SX]
-]  # scalar name -> an equation, and the side that says what it is
+# scalar name -> an equation, and the side of it that says what the scalar is
+Definitions = Mapping[str, tuple[Equation, ca.SX]]
 
 
 class _Defining:
@@ -198,19 +197,21 @@ def defining(instance: Instance, tree: Tree, equations: Sequence[Equation]) -> D
     On the side that defines a quantity of a connector stand quantities only of connectors that are nearer to the root.
     """
     names = {
-        p: [s.name() for n in propagated(c) for s in scalars(symbol_of(c, n))] for p, c in tree.nodes.items()
+        p: [(n, s.name()) for n in propagated(c) for s in scalars(symbol_of(c, n))]
+        for p, c in tree.nodes.items()
     }
-    those = _Defining(instance, equations, {name for each in names.values() for name in each})
-    for path, edge, _ in tree.reached:
-        for name in names[path]:
-            if edge is None or edge.branch is not None:
+    those = _Defining(instance, equations, {name for each in names.values() for _, name in each})
+    for path, edge, root in tree.reached:
+        given = _given(path, tree.nodes[path], edge, root, instance, tree)
+        for whole, name in names[path]:
+            if whole not in given:
                 those.define(name, needed=True)
             those.unreached.discard(name)
     for name in [*those.inlined]:
         if name in those.inlined:
             those.define(name)
-    whole = [p.elements for p in inlined(instance.quantities)]
-    partly = {n for each in whole if not those.found.keys() >= {*each} for n in each}
+    elements = [p.elements for p in inlined(instance.quantities)]
+    partly = {n for each in elements if not those.found.keys() >= {*each} for n in each}
     return {name: one for name, one in those.found.items() if name not in partly}
 
 

@@ -69,7 +69,8 @@ def _read(branch: Happening, symbols: Symbols, held: Collection[str], where: Whe
         return tuple((n, _without_pre(e, symbols, held, place)) for n, e in pairs)
 
     found = When(plain, settled(reinits), settled(assignments), "; ".join(words), path, model, number, after)
-    return replace(found, words=branch.words, initially=branch.initially, failure=branch.failure)
+    found = replace(found, words=branch.words, initially=branch.initially, failure=branch.failure)
+    return replace(found, waits=branch.waits)
 
 
 def condition_of(value: Any, symbols: Symbols, held: Collection[str], place: str) -> ca.SX:

@@ -169,7 +169,7 @@ class Kinematics(Record):
     @property
     def turning(self) -> bool:
         """Whether the joints also choose the orientation of the tool, so that ik needs one."""
-        return self._solver.turning if isinstance(self._solver, ModelFunctions) else len(self.joints) == 6
+        return self._solver.turning if isinstance(self._solver, ModelFunctions) else len(self.joints) > 3
 
     def ik_of_five_degrees(self, r: Any, R: Any) -> np.ndarray:
         """Coordinates q (N, 6) of the F1 as if the links of an arm were parallel and of one length (4.25).

@@ -8,6 +8,7 @@ parameter can be bound to others (`area = Parameter(width * height)`, `Cart(m=Ba
 import enum
 import operator
 from collections.abc import Callable, Iterator
+from itertools import product
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -305,6 +306,12 @@ class Array(Generic[Component]):
         self.elements = [
             component(**{**modifications, **one}) if isinstance(one, dict) else one for one in count
         ]
+        self.shape: tuple[int, ...] = (len(self.elements),)  # the elements stand row after row
+
+    def names(self, name: str, first: int) -> list[str]:
+        """Names of the elements; first: the lowest index."""
+        places = product(*(range(first, first + size) for size in self.shape))
+        return [f"{name}[{','.join(map(str, place))}]" for place in places]
 
     def __repr__(self) -> str:
         name = getattr(self.component, "__name__", "a function")

@@ -60,7 +60,7 @@ class Happening:
 
     words: what it is, where its condition does not say it; initially: whether it acts at the start, too, if its condition
     holds there; failure: words of the error that it is instead of acting, "" if it is none; where: path, class and number
-    of its statement, if that is not the chain's.
+    of its statement, if that is not the chain's; waits: whether it acts in rounds in which no other kind does.
     """
 
     condition: Any
@@ -69,6 +69,7 @@ class Happening:
     initially: bool = False
     failure: str = ""
     where: tuple[str, str, int] | None = None
+    waits: bool = False
 
 
 @dataclass(frozen=True, eq=False)

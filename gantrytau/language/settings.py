@@ -9,15 +9,17 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
+
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Bounds, Parameter, Quantity, Start
 from gantrytau.language.model import Declared, Outer, check_member, merge
 
-Step = str | int
+Step = str | int | tuple[int, ...]
 Part = TypeVar("Part", bound=Declared)
 
 ATTRIBUTES = ("start", "fixed", "min", "max", "nominal")
-_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")
+_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+(?:,\d+)*)\]")
 
 
 def with_setting(model: Part, name: str, value: Any) -> Part:
@@ -41,9 +43,14 @@ def _steps(name: str) -> list[Step]:
         match = _STEP.match(name, place)
         if match is None:
             raise ModelError("expected a name as the model prints it, such as carts[0].m or x.start")
-        found.append(match[1] or int(match[2]))
+        found.append(match[1] or _index(match[2]))
         place = match.end()
     return found
+
+
+def _index(numbers: str) -> int | tuple[int, ...]:
+    first, *rest = map(int, numbers.split(","))
+    return (first, *rest) if rest else first
 
 
 def _changed(part: Part, steps: Sequence[Step], value: Any, path: str) -> Part:
@@ -78,14 +85,23 @@ def _modified(
     elif isinstance(member, Outer):
         raise ModelError(f"{path} refers to a component further out; set it there")
     elif isinstance(member, Array):
-        if rest and isinstance(rest[0], int):
-            rest[0] -= component.first_index
+        if rest and not isinstance(rest[0], str):
+            rest[0] = _place(rest[0], member.shape, component.first_index)
         new = _array(member, old, under, rest, value, path)
     elif isinstance(member, Declared):
         new = _component(member, old, under, rest, value, path)
     else:
         new = value  # a plain constant that shapes the model
     return {**above, head: new}
+
+
+def _place(index: int | tuple[int, ...], shape: tuple[int, ...], first: int) -> int:
+    """The place of an element that stands row after row; minus 1 where there is none."""
+    if isinstance(index, int) and len(shape) == 1:
+        return index - first
+    places = [one - first for one in (index if isinstance(index, tuple) else (index,))]
+    inside = len(places) == len(shape) and all(0 <= k < n for k, n in zip(places, shape, strict=True))
+    return int(np.ravel_multi_index(places, shape)) if inside else -1
 
 
 def _component(

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.references import dotted, nodes_of, references
+from gantrytau.modelica.references import dotted, nodes_of, references, whole_name
 
 BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
@@ -56,13 +56,13 @@ def sample_calls(test: tree.Expression) -> Iterator[tree.Call]:
 
 
 def calls_before(e: Any) -> Iterator[tree.Call]:
-    """Calls of `pre`, `edge` and `change` of variables without subscripts."""
+    """Calls of `pre`, `edge` and `change` of variables, whole or with subscripts at the end."""
     for one in nodes_of(e):
         if (
             isinstance(one, tree.Call)
             and one.function.parts[0][0] in BEFORE
             and one.arguments
-            and dotted(one.arguments[0])
+            and whole_name(one.arguments[0])
         ):
             yield one
 
@@ -82,6 +82,18 @@ def targets(items: Items) -> Iterator[str]:
                 yield each.parts[0][0]
 
 
+def whens_in(structure: Any) -> Iterator[tree.Branching]:
+    """All `when` among the equations of a class."""
+    left = [item for section in structure.scope.sections for item in section.items]
+    for item in left:
+        if isinstance(item, tree.Branching) and item.word == "when":
+            yield item
+        elif isinstance(item, tree.Branching):
+            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
+        elif isinstance(item, tree.ForLoop):
+            left += item.items
+
+
 def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
     """Calls of `assert`, and of `terminate` under a further condition, in a `when`."""
     for item in items:
@@ -97,11 +109,11 @@ def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
 def changed_in(test: tree.Expression, items: Items) -> Iterator[str]:
     """Names of variables whose changes are a condition, by `edge` or `change`, or as b beside pre(b)."""
     own = set(targets(items))
-    calls = [one for one in calls_before(test) if dotted(one.arguments[0]) not in own]
+    calls = [one for one in calls_before(test) if whole_name(one.arguments[0]) not in own]
     inside = {id(one.arguments[0]) for one in calls}
     bare = [one for one in references(test) if id(one) not in inside]
     yield from (
-        dotted(one.arguments[0]) for one in calls if not is_call(one, "pre") or one.arguments[0] in bare
+        whole_name(one.arguments[0]) for one in calls if not is_call(one, "pre") or one.arguments[0] in bare
     )
 
 
@@ -122,9 +134,19 @@ def gives_value_before(item: tree.EquationOrStatement) -> bool:
     )
 
 
+def outer_name(name: str) -> str:
+    """The member by which a class reaches the component around it that is `inner` of that name, where it has one as well."""
+    return f"outer {name}"
+
+
 def followed_name(kind: str, name: str) -> str:
     """The name of a Discrete that follows a variable."""
     return kind + name.replace(".", "_")
+
+
+def own_turn(name: str) -> str:
+    """The name for the parity of a Discrete that follows the expression of its equation."""
+    return f"{name}.own"
 
 
 def sample_name(call: tree.Expression) -> str:

@@ -28,6 +28,13 @@ def dotted(e: Any) -> str:
     return ".".join(name for name, _ in e.parts) if named else ""
 
 
+def whole_name(e: Any) -> str:
+    """The name of a reference without the subscripts at its end, with dots; "" for another expression."""
+    if not isinstance(e, tree.ComponentReference):
+        return ""
+    return dotted(replace(e, parts=(*e.parts[:-1], (e.parts[-1][0], ()))))
+
+
 def references(expression: Any) -> list[tree.ComponentReference]:
     """The references in an expression, but for names of functions."""
     return [one for one in nodes_of(expression) if isinstance(one, tree.ComponentReference)]
@@ -130,8 +137,8 @@ class Members(Protocol):
         """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
         ...
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        """The least and the greatest value of an Integer; None for a Boolean."""
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
+        """The values of an Integer with min and max, 0 and 1 of a Boolean; None for another Integer."""
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         """Whether it holds parameters and constants only."""

@@ -115,11 +115,14 @@ class Integrators:
     def rounded(self, error: RuntimeError, z: np.ndarray) -> bool:
         """Whether algebraics may have larger rounding errors than so far, where an integrator gave up for them.
 
-        What `settle` found solves the equations as well as rounding allows: where large forces decide a small one, the
-        integrator cannot make it better, gives up at once, and is asked for less, near a singular pose for less again.
+        Where large forces decide a small one, rounding keeps the integrator from making better what `settle` found: it
+        gives up, at its start or in a step, and is asked for less; at its start near a singular pose for less again.
         """
         most = float(np.abs(z).max(initial=1.0))
-        if "IDACalcIC" not in str(error) or self.size >= WORST * most:
+        largest = (
+            WORST * most if "IDACalcIC" in str(error) else most if "IDA_CONV_FAIL" in str(error) else 0.0
+        )
+        if self.size >= largest:
             return False
         self.size = most if self.size < most else 10 * self.size
         return True

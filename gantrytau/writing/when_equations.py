@@ -36,8 +36,8 @@ class WhenEquations:
         for one in flat.delays:
             self.spoken[one.name] = Written(f"delay({self._text(one.expression)}, {self._text(one.time)})")
         for one in flat.whens:
-            if len(one.assignments) == 1 and NEXT_SAMPLE.fullmatch(one.assignments[0][0]):
-                self._read_sample(one)
+            if len(one.assignments) == 1 and NEXT_SAMPLE.fullmatch(one.assignments[0][0]) and one.after >= 0:
+                self._read_sample(flat.whens[one.after], one)
         self.held = {*(one.name for one in flat.sampled), *flat.discretes} - self.spoken.keys()
         self.aside: dict[str, Node] = {}
         for one in flat.sampled:
@@ -46,19 +46,22 @@ class WhenEquations:
                 self.aside[f"={one.name}"] = node
         variables = {n for v in (*flat.variables, *flat.propagated) for n in v.elements}
         self._moving = variables - self.spoken.keys()
-        starting = any(one.initially and one.words != "sample" for one in flat.whens)
+        others = (one for one in flat.whens if not any(name in self.spoken for name, _ in one.assignments))
+        starting = any(one.initially and one.words != "sample" for one in others)
         self.declared = [f"  discrete Real {BEGUN}(start=0, fixed=true);"] if starting else []
 
     def _text(self, expression: ca.SX) -> str:
         (node,) = self.graph.read([expression])
         return write([node], self.syntax, {})[node].text
 
-    def _read_sample(self, one: When) -> None:
-        """The condition `time >= next` and the next instant of a `sample`, next = pre(next) + n * period."""
+    def _read_sample(self, first: When, one: When) -> None:
+        """The condition `time >= next` of a `sample`, next = pre(next) + n * period; first: next = start + n * period."""
         ((name, value),) = one.assignments
         symbols = [self.flat.time, *(s for s in ca.symvar(value) if s.name() == f"pre({name})")]
         period = ca.substitute(value, ca.vertcat(*symbols), ca.DM.zeros(len(symbols)))
-        (start,) = next(v.start for v in self.flat.variables if v.name == name) or (ca.SX(0),)
+        ((_, begun),) = first.assignments
+        sides = [begun.dep(k) for k in range(2)] if begun.is_op(ca.OP_ADD) else []
+        start = next((side for side in sides if not ca.depends_on(side, self.flat.time)), ca.SX(0))
         self.spoken[name] = Written(f"sample({self._text(start)}, {self._text(period)})")
         self._samples[self._truth(one.condition)] = self.spoken[name]
 

@@ -29,6 +29,7 @@ from gantrytau_models.quantities import (
     REMEDY,
     ROUNDING,
     Matrix,
+    Pair,
     Vector,
     check_inertia,
     check_rotation,
@@ -113,7 +114,7 @@ class Arm:
 
 @dataclass(frozen=True, kw_only=True)
 class _Robot(Record):
-    """What all Gantry-Tau robots have."""
+    """What all Gantry-Tau robots have. Friction is a number for each cart, or a pair: at positive and at negative speed."""
 
     name: str
     plate_mass: float = field(metadata=quantity("kg", "mass of the plate and tool", positive=True))
@@ -126,15 +127,24 @@ class _Robot(Record):
         metadata=_matrix("1", "nominal orientation, plate to world; a search starts here"),
     )
     cart_masses: Vector = field(metadata=_vector("kg", "mass of each cart and its drive", positive=True))
-    coulomb: Vector = field(metadata=_vector("N", "Coulomb friction of each cart", least=0.0))
-    viscous: Vector = field(metadata=_vector("kg/s", "viscous friction of each cart", least=0.0))
+    coulomb: Vector | tuple[Pair, Pair, Pair] = field(
+        metadata=_vector("N", "Coulomb friction of each cart", least=0.0, directed=True)
+    )
+    viscous: Vector | tuple[Pair, Pair, Pair] = field(
+        metadata=_vector("kg/s", "viscous friction of each cart", least=0.0, directed=True)
+    )
     source: str
     assumed: tuple[str, ...] = ()  # what the source does not print for this robot
+    fitted: str = ""  # which numbers are fitted to printed results, and what that makes of these results
 
     def __post_init__(self):
         hold_numbers(self, self.name)
         check_inertia(f"{self.name}.plate_inertia", self.plate_inertia)
         check_rotation(f"{self.name}.plate_rotation", self.plate_rotation)
+
+    def friction_by_direction(self) -> bool:
+        """Whether friction is told as pairs, at positive and at negative speed."""
+        return any(isinstance(one, tuple) for one in (*self.coulomb, *self.viscous))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -300,7 +310,8 @@ def _read(name: str) -> Prototype | RotatingPrototype:
         kind = FlexiblePrototype
     arms = [read_arm(name, i) for i in range(len(table["arms"]))]
     assumed = tuple(table.get("assumed", ()))
-    return _build(kind, name, name=name, arms=arms, source=table["source"], assumed=assumed, **others)
+    others |= dict(source=table["source"], assumed=assumed, fitted=table.get("fitted", ""))
+    return _build(kind, name, name=name, arms=arms, **others)
 
 
 def names() -> list[str]:
@@ -311,6 +322,7 @@ def names() -> list[str]:
 D1: Prototype
 GT_A: Prototype
 L1: Prototype
+L1_asymmetric: Prototype
 L1_flexible: FlexiblePrototype
 F1: RotatingPrototype
 F1_ideal: RotatingPrototype

@@ -11,6 +11,7 @@ from gantrytau.border.refusal import Given, ModelError
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+Pair = tuple[float, float]
 
 REMEDY = "correct the value in the TOML file or in dataclasses.replace"
 ROUNDING = 1e-5  # ten times what six decimals leave of a rotation matrix
@@ -20,9 +21,10 @@ def quantity(unit: str, description: str, **limits: Any) -> dict[str, Any]:
     """What a field says about its number, or about each number of its array.
 
     limits: shape of an array; positive: each number must be above 0; least: the smallest number allowed;
-    nonzero: not all may be 0; optional: None is allowed.
+    nonzero: not all may be 0; optional: None is allowed; directed: each number may be a pair,
+    at positive and at negative speed.
     """
-    usual = dict(shape=(), positive=False, least=None, nonzero=False, optional=False)
+    usual = dict(shape=(), positive=False, least=None, nonzero=False, optional=False, directed=False)
     return dict(unit=unit, description=description) | usual | limits
 
 
@@ -45,7 +47,8 @@ def hold_numbers(record: Any, path: str) -> None:
             continue
         bounds: dict[str, Any] = dict(above=0.0) if about["positive"] else dict(least=about["least"])
         if about["shape"]:
-            found = array(path, item.name, value, about["shape"], unit=about["unit"], **bounds)
+            shapes = [about["shape"], (*about["shape"], 2)][: 1 + about["directed"]]
+            found = array(path, item.name, value, *shapes, unit=about["unit"], **bounds)
             if about["nonzero"] and not found.any():
                 raise ModelError("expected the axis of a guideway", place=path, found=Given(item.name, value))
             value = tuple(map(tuple, found.tolist())) if found.ndim > 1 else tuple(found.tolist())

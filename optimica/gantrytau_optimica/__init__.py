@@ -54,6 +54,8 @@ from gantrytau_optimica.learning import (
 )
 from gantrytau_optimica.optimize import optimize, prepare
 from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.predictive.estimators.extended_kalman import ExtendedKalman
+from gantrytau_optimica.predictive.estimators.moving_horizon import MovingHorizon
 from gantrytau_optimica.predictive.mpc import Mpc
 from gantrytau_optimica.prepared import Prepared
 from gantrytau_optimica.problem.optimization import (
@@ -83,6 +85,7 @@ __all__ = [
     "Estimate",
     "Excitation",
     "Experiment",
+    "ExtendedKalman",
     "Finding",
     "Free",
     "Friction",
@@ -98,6 +101,7 @@ __all__ = [
     "Measurements",
     "MissingGuess",
     "MotionLog",
+    "MovingHorizon",
     "Mpc",
     "NormOptimal",
     "Optimization",

@@ -1,8 +1,9 @@
 """`make library-results`: the examples that the reference results name, and a table of what became of them.
 
 By environment: MODELICAPATH, the folder of the libraries; REFERENCE_RESULTS, the folder of the reference results; ONLY, an
-example or a package; TIME_LIMIT, s of processor time for an example; AGAIN=1 to run what has an outcome, too. Outcomes are
-kept in build/library_results: a run that was interrupted goes on where it was.
+example or a package; TIME_LIMIT, s of processor time for an example; AGAIN=1 to run what has an outcome, too. Examples of
+another library than Modelica, in the first folder of MODELICAPATH, are run without a reference. Outcomes are kept in
+build/library_results: a run that was interrupted goes on where it was.
 """
 
 import hashlib
@@ -19,7 +20,7 @@ from pathlib import Path
 from gantrytau import ModelError
 from gantrytau.modelica import read_tree, tree
 from tests.library_results.example import NOT_RUN, Outcome, one_line
-from tests.library_results.references import SIGNALS, Reference, references
+from tests.library_results.references import SIGNALS, Example, Reference, examples, references
 from tests.library_results.summary import print_summary, write_summary
 
 ROOT = Path(__file__).parents[2]
@@ -63,7 +64,8 @@ def digest(files: Iterable[Path]) -> str:
 def run(reference: Reference, library: Path, key: str, limit: float) -> Outcome:
     """The outcome of an example in a process of its own, kept in a file."""
     command = [sys.executable, "-m", "tests.library_results.example"]
-    command += [reference.name, str(library), str(reference.root), str(limit)]
+    root = "" if isinstance(reference, Example) else str(reference.root)
+    command += [reference.name, str(library), root, str(limit)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=WALL * limit, cwd=ROOT)
         if done.returncode == 0:
@@ -93,13 +95,13 @@ def kept(reference: Reference, key: str) -> Outcome | None:
 def main() -> int:
     """Runs what is asked for and has no outcome yet; prints the table and writes that of the site."""
     library = folder_of("MODELICAPATH", "package.mo", _packages("MODELICAPATH"))
-    root = folder_of("REFERENCE_RESULTS", SIGNALS, _signals("REFERENCE_RESULTS"))
     only = os.environ.get("ONLY", "")
     limit = float(os.environ.get("TIME_LIMIT") or TIME_LIMIT)
-    asked = references(root, only)
+    every = _asked(library, only)
+    asked = [one for one in every if not only or f"{one.name}.".startswith(f"{only.rstrip('.')}.")]
     if not asked:
         raise SystemExit(
-            f"library-results: found no example ONLY={only}, expected one or a package of {root}"
+            f"library-results: found no example ONLY={only}, expected one or a package of {library}"
         )
     versions = {}
     for name in dict.fromkeys(one.name.partition(".")[0] for one in asked):
@@ -107,7 +109,7 @@ def main() -> int:
             versions[name] = version_of(library / name / "package.mo")
         except ModelError as error:
             raise SystemExit(f"library-results: {name}: {one_line(error)}") from error
-        if versions[name] != VERSION:
+        if versions[name] != VERSION and not isinstance(asked[0], Example):
             print(
                 f"{name}: found version {versions[name]!r}, expected {VERSION}, that of the reference results"
             )
@@ -116,7 +118,7 @@ def main() -> int:
     KEPT.mkdir(parents=True, exist_ok=True)
 
     def outcome(one: Reference) -> Outcome:
-        key = f"{sources} {code} {digest(path for path in one.folder.iterdir() if path.is_file())} {limit:g}"
+        key = f"{sources} {code} {digest(path for path in one.folder.glob('*') if path.is_file())} {limit:g}"
         found = None if os.environ.get("AGAIN") else kept(one, key)
         found = found or run(one, library, key, limit)
         print(f"{found.name}: {found.word} {found.detail}".rstrip(), flush=True)
@@ -127,9 +129,20 @@ def main() -> int:
     print_summary(found)
     whole = {one.package for one in asked}
     if only:  # packages of which only a part was run stay as they are on the site
-        whole -= {one.package for one in references(root) if one not in found}
+        whole -= {one.package for one in every if one not in found}
     write_summary({one: what for one, what in found.items() if one.package in whole}, versions, sources)
     return 0
+
+
+def _asked(library: Path, only: str) -> list[Reference]:
+    """All examples with reference results; without these, those of the package that ONLY names."""
+    if (
+        not os.environ.get("REFERENCE_RESULTS")
+        and only
+        and not f"{only}.".startswith(("Modelica.", "ModelicaTest."))
+    ):
+        return examples(library, only.partition(".")[0])
+    return references(folder_of("REFERENCE_RESULTS", SIGNALS, _signals("REFERENCE_RESULTS")))
 
 
 def _packages(variable: str) -> Iterable[Path]:

@@ -2,16 +2,19 @@
 
 import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from gantrytau.modelica import read_tree, tree
+
 SIGNALS, SETTINGS = "comparisonSignals.txt", "creation.txt"
 SETTING = re.compile(r"^(StartTime|StopTime|Interval|Tolerance)\s*=\s*([-+.\deE]+)", re.MULTILINE)
 POINTER = b"version https://git-lfs"  # the beginning of a file that stands for a large one
-LONGEST_RANGE = 5001  # points
+LONGEST_RANGE = 20_001  # points
 POINTS = 501  # at least
 
 
@@ -31,7 +34,7 @@ class Reference:
     def package(self) -> str:
         """The package in whose row of the table the example is counted."""
         before = self.name.partition(".Examples.")[0].split(".")
-        return ".".join(before[: 2 if before[0] == "ModelicaTest" else 3])
+        return ".".join(before[: {"Modelica": 3, "ModelicaTest": 2}.get(before[0], 1)])
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
@@ -75,6 +78,33 @@ class Reference:
             names = [{"Time": "time"}.get(name.strip(), name.strip()) for name in next(rows)]
             values = np.array([[float(cell) for cell in row[: len(names)]] for row in rows if row])
         return dict(zip(names, values.T, strict=True))
+
+
+@dataclass(frozen=True)
+class Example(Reference):
+    """An example of a library without reference results; root: the folder of the library."""
+
+
+def examples(library: Path, package: str) -> list[Reference]:
+    """The models of a package in a folder of libraries whose annotation `experiment` says when they end."""
+    found = []
+    for path in sorted((library / package).rglob("*.mo")):
+        read = read_tree(path)
+        for one in read.classes:
+            found += [Example(library, name) for name in _experiments(one, read.within or "")]
+    return found
+
+
+def _experiments(one: tree.ClassDefinition, around: str) -> Iterator[str]:
+    """The full names of a class and of the classes in it that are models with an `experiment`."""
+    name = f"{around}.{one.name}".lstrip(".")
+    said = [a.name for a in one.annotation or () if isinstance(a, tree.Argument)]
+    if one.kind in ("model", "block") and "partial" not in one.prefixes and "experiment" in said:
+        yield name
+    for section in one.body.sections if isinstance(one.body, tree.Composition) else ():
+        for item in section.items:
+            if isinstance(item, tree.ClassDefinition):
+                yield from _experiments(item, name)
 
 
 def references(root: Path, only: str = "") -> list[Reference]:

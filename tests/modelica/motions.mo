@@ -3,10 +3,11 @@ package Motions "models of one class each"
   type Side = enumeration(left "minus x", right "plus x");
 
   model Pendulum "in Cartesian coordinates"
+    import Motions.Side.right;
     parameter Real L(unit = "m", min = 0) = 0.5, m(unit = "kg") = 1;
-    parameter Side side = Side.right;
+    parameter Side side = right;
     parameter Real x0(unit = "m") = if side == Side.right then 0.3 else -0.3;
-    Real r[2](each unit = "m", start = {x0, -0.4});
+    Real r[2](unit = {"m", "m"}, start = {x0, -0.4});
     Real v[2](each unit = "m/s", start = {0, 0});
     Real f(unit = "N/m") "force of the rod for a length";
   initial equation

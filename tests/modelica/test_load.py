@@ -24,6 +24,7 @@ from gantrytau import (
     reinit,
     simulate,
     terminate,
+    translate,
     when,
 )
 from gantrytau.electrical import Capacitor, DcMotor, Ground, Resistor, VoltageSource
@@ -227,6 +228,17 @@ def test_what_is_final_has_no_other_value_and_a_flow_meets_flows(tmp_path):
         simulate(library["F"](), stop=1.0, parameters={"k": 2.0})
 
 
+def test_a_file_within_a_package_comes_before_it_and_names_the_class_of_its_name(tmp_path):
+    (tmp_path / "use.mo").write_text("within Lag;\nmodel Use\n extends Lag.Lag(k=2);\nend Use;")
+    (tmp_path / "lag.mo").write_text(
+        "package Lag\nmodel Lag\n parameter Real k;\n Real x(start=1, fixed=true);\nequation\n der(x) = -k*x;\nend Lag;\n"
+        "end Lag;"
+    )
+    library = load_modelica(tmp_path / "use.mo", tmp_path / "lag.mo")
+    assert library.names == ("Lag.Lag", "Lag.Use")
+    assert simulate(library["Lag.Use"](), stop=1.0)["x"][-1] == pytest.approx(np.exp(-2), rel=1e-7)
+
+
 def test_a_library_in_folders_is_read_where_it_is_needed(tmp_path):
     (tmp_path / "Lib" / "Parts").mkdir(parents=True)
     (tmp_path / "Lib" / "package.mo").write_text("package Lib\nend Lib;")
@@ -305,3 +317,12 @@ def test_a_constraint_of_a_class_modifies_what_replaces_it(tmp_path):
     found = simulate(load_modelica(tmp_path / "p.mo")["P.M"](), stop=1.0)
     values = [found.at(np.array([1.0]), f"{name}.x.y")[0] for name in ("plain", "over", "other", "own")]
     assert values == [20, 30, 20, 40]
+
+
+def test_a_derivative_whose_factor_is_evaluated_to_zero_asks_for_none(tmp_path):
+    (tmp_path / "c.mo").write_text(
+        "model C parameter Real c = 0 annotation(Evaluate=true); Real u, i;"
+        " equation u = sin(time) + abs(cos(time)); i = c * der(u); end C;"
+    )
+    made = load_modelica(tmp_path / "c.mo")["C"]
+    assert [max(translate(made(c=c)).indexed.counts) for c in (0, 2)] == [0, 1]

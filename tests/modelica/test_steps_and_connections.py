@@ -157,3 +157,84 @@ def test_a_member_that_an_expandable_connector_does_not_declare_is_named(tmp_pat
     (tmp_path / "lines.mo").write_text(TEXT)
     with pytest.raises(ModelError, match=r"'three' of an expandable connector, .* declare it in Lines\.Bus"):
         translate(load_modelica(tmp_path / "lines.mo")["Lines.Undeclared"]())
+
+
+STAGES = """package Stages
+  model Stage "on from set until reset, each a round of the instant later"
+    parameter Boolean first = false;
+    Boolean on, next, set, reset;
+  initial equation
+    pre(next) = pre(on);
+    on = first;
+  equation
+    on = pre(next);
+    next = set or on and not reset;
+  end Stage;
+  model Passage "lets go on 1 s after it was reached"
+    Boolean reached, goes;
+    discrete Real begun;
+  initial equation
+    pre(begun) = time;
+    pre(reached) = false;
+  equation
+    when reached then
+      begun = time;
+    end when;
+    goes = reached and time >= begun + 1;
+  end Passage;
+  model Circle
+    Stage stage[3](first = {true, false, false});
+    Passage passage[3];
+  equation
+    for k in 1:3 loop
+      passage[k].reached = stage[k].on and not stage[mod(k, 3) + 1].on;
+      stage[k].reset = passage[k].goes;
+      stage[mod(k, 3) + 1].set = passage[k].goes;
+    end for;
+  end Circle;
+  connector Port
+    Real v;
+    flow Real n;
+  end Port;
+  model Root
+    parameter Real share = 1;
+    Port p;
+  equation
+    p.v = 0;
+  end Root;
+  model Source
+    Port p(n = share);
+    parameter Real share = 1;
+  end Source;
+  model Member
+    outer Root root;
+    Source own(share = root.share);
+  equation
+    connect(own.p, root.p);
+  end Member;
+  model Group
+    inner outer Root root(share = 2);
+    Source own(share = root.share);
+    Member member[3];
+  equation
+    connect(own.p, root.p);
+  end Group;
+  model Whole
+    inner Root root(share = 5);
+    Group group;
+  end Whole;
+end Stages;
+"""
+
+
+def test_a_time_that_begins_with_a_stage_is_known_before_the_next_one(tmp_path):
+    (tmp_path / "stages.mo").write_text(STAGES)
+    result = simulate(load_modelica(tmp_path / "stages.mo")["Stages.Circle"](), stop=5.0)
+    on = [[result.at(t, f"stage[{k}].on") for k in (1, 2, 3)] for t in (0.5, 1.5, 2.5, 3.5, 4.5)]
+    assert on == [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0]]
+
+
+def test_what_is_inner_and_outer_is_for_its_class_the_one_around_it(tmp_path):
+    (tmp_path / "stages.mo").write_text(STAGES)
+    result = simulate(load_modelica(tmp_path / "stages.mo")["Stages.Whole"](), stop=1.0)
+    assert [result.final(name) for name in ("root.p.n", "group.root.p.n")] == [-5, -6]

@@ -211,13 +211,22 @@ def test_one_link_may_be_longer():
 
 
 def test_names_lists_what_there_is():
-    assert prototypes.names() == ["D1", "F1", "F1_ideal", "F1_printed", "GT_A", "L1", "L1_flexible"]
+    assert prototypes.names() == [
+        "D1",
+        "F1",
+        "F1_ideal",
+        "F1_printed",
+        "GT_A",
+        "L1",
+        "L1_asymmetric",
+        "L1_flexible",
+    ]
     # what type checkers and editors are told
     assert set(prototypes.names()) <= set(prototypes.__annotations__)
 
 
 def test_an_unknown_prototype_is_named_with_those_that_exist():
-    message = r"there is no 'L11', expected one of D1, F1, F1_ideal, F1_printed, GT_A, L1, L1_flexible; did you mean 'L1'\?"
+    message = rf"there is no 'L11', expected one of {', '.join(prototypes.names())}; did you mean 'L1'\?"
     with pytest.raises(ModelError, match=message):
         _ = prototypes.L11
     assert not hasattr(prototypes, "NOPE")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gantrytau import (
+    Discrete,
     Fixed,
     Mode,
     Model,
@@ -27,6 +28,7 @@ from gantrytau import (
     time,
     transition,
     translate,
+    when,
 )
 from gantrytau.blocks import Ramp, Step
 from gantrytau.electrical import Capacitor, CurrentSource, Ground, Inductor, Resistor, VoltageSource
@@ -179,6 +181,29 @@ def test_a_step_of_voltage_divides_by_the_capacities(fixed, write):
     assert found.final("D.v") == pytest.approx(2.0 * math.exp(-1 / 4), rel=1e-6)
 
 
+class Stepped(Divider):
+    """Rises by a rate and jumps at 1 s, both told by Discretes."""
+
+    begin = Discrete(0.0, unit="s", description="begin of the rise")
+    level = Discrete(0.0, unit="V", description="what has jumped so far")
+    rate = Parameter(0.0, unit="V/s", description="rate of the rise")
+
+    def equations(self) -> Any:
+        yield from super().equations()
+        yield when(time >= 1.0, self.level == 8, self.begin == time)
+        yield self.s.v == self.level + self.rate * (time - self.begin)
+
+
+def test_a_step_by_a_discrete_divides_as_one_by_a_condition():
+    final = simulate(Stepped(D=dict(v=Fixed(0.0))), stop=2.0).final("D.v")
+    assert final == pytest.approx(2.0 * math.exp(-1 / 4), rel=1e-6)
+
+
+def test_what_goes_on_where_a_discrete_takes_a_new_value_throws_nothing():
+    steady = simulate(Divider(D=dict(v=Fixed(0.0))), stop=2.0, inputs={"s.v": lambda t: 8 * t}).final("D.v")
+    assert simulate(Stepped(D=dict(v=Fixed(0.0)), rate=8.0), stop=2.0).final("D.v") == pytest.approx(steady)
+
+
 @pytest.mark.parametrize("write", [lambda t: t >= 0, lambda t: t > 0])
 def test_at_the_start_what_is_fixed_holds_behind_what_turns(write):
     step = {"s.v": lambda t: if_else(write(t), 8.0, 0.0)}
@@ -321,6 +346,23 @@ def test_a_position_that_jumps_on_a_mass_is_refused():
     with pytest.raises(SolveError, match=words) as refused:
         simulate(Held(), stop=2.0, inputs={"drive.s": lambda t: if_else(t > 1, 1.0, 0.0)})
     assert refused.value.time == pytest.approx(1.0)
+
+
+class HeldAtInstants(Model):
+    drive, mass = translational.Position(), translational.Mass(m=1.0)
+    n, m = (Discrete(0.0, unit="m", description="a part of the place") for _ in range(2))
+
+    def equations(self) -> Any:
+        yield from row(self.drive, self.mass)
+        yield when(time >= 1.0, self.n == 1, self.m == 2)
+        yield self.drive.s == self.n + self.m
+
+
+def test_a_position_that_a_discrete_lets_jump_is_refused():
+    with pytest.raises(
+        SolveError, match=r"at t = 1 s n and m turns, and drive.s would jump at once, for which drive.f"
+    ):
+        simulate(HeldAtInstants(), stop=2.0)
 
 
 class Drag(Model):

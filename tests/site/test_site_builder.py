@@ -135,6 +135,7 @@ def test_pages_of_trees_are_there():
         "sources/index.md",
         "gallery/index.md",
         "library/index.md",
+        "classics/index.md",
     }
     index = (ROOT / "notebooks/site/index.md").read_text()
     for body in re.findall(r"```\{toctree\}\n(.*?)```", index, re.DOTALL):

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.symbol_spaces import Substitution
 from gantrytau.language.symbols import split_derivative
-from gantrytau.simulation.events.impulses import Levels, turning
+from gantrytau.simulation.events.impulses import Levels, stepping, turning
 from gantrytau_fmu.code.switching import WithModes
 
 
@@ -48,6 +49,11 @@ def impulses_of(
     there are no formulas.
     """
     dae = found.dae
+    if steps := stepping(dae, found.pieces):
+        raise ModelError(
+            f"{dae.name}: found {steps[0]}, which is set at instants, in an equation that is differentiated, expected one "
+            "that is not in an FMU; let it drive a force or a current, or pass it through a filter"
+        )
     known = tuple(n for n in dae.symbols if split_derivative(n)[0] in set(dae.known))
     levels = Levels(dae, found.pieces.residuals, known)
     if not turning_names(found):

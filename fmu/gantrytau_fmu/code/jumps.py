@@ -19,7 +19,8 @@ class JumpFormulas:
     conditions: 1 where they hold, in modes; rose: symbols, 1 where a condition has become true; acts: which whens act;
     discretes, values: new values of the Discretes and of the states whose places are `states`; labels: where the whens
     are stated, messages: what they say of the end of the run, "" of those that do not end it; initially: whether they act at
-    the start, too, failures: words of the errors that they are instead of acting, "" of those that act.
+    the start, too, failures: words of the errors that they are instead of acting, "" of those that act; waits: whether
+    they act only in rounds in which none of the others does.
     """
 
     conditions: ca.SX
@@ -32,6 +33,7 @@ class JumpFormulas:
     messages: tuple[str, ...]
     initially: tuple[bool, ...]
     failures: tuple[str, ...]
+    waits: tuple[bool, ...]
 
     @property
     def everything(self) -> tuple[ca.SX, ...]:
@@ -72,4 +74,5 @@ def jump_of(found: WithModes, to_system: Callable[[Sequence[ca.SX]], list[ca.SX]
         messages=tuple(one.message for one in whens),
         initially=tuple(one.initially for one in whens),
         failures=tuple(one.failure for one in whens),
+        waits=tuple(one.waits for one in whens),
     )

@@ -177,6 +177,7 @@ def _tables(formulas: Formulas, contents: Contents) -> list[str]:
         _texts("gt_when_ends", formulas.jump.messages),
         _texts("gt_when_fails", formulas.jump.failures),
         _integers("gt_when_initially", formulas.jump.initially),
+        _integers("gt_when_waits", formulas.jump.waits),
         _texts("gt_x_names", formulas.states),
         _texts("gt_z_names", formulas.z_names),
         _texts("gt_root_names", formulas.roots),

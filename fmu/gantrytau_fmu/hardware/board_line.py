@@ -13,10 +13,11 @@ from typing import Self
 
 import numpy as np
 
+from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import array, instance, number, whole
 from gantrytau.border.refusal import Given, ModelError, SolveError
 from gantrytau.kernels import c_compiler
-from gantrytau_fmu.hardware.step_code import StepCode
+from gantrytau_fmu.hardware.step_code import write_line
 
 SYNC = 0xA5
 AROUND = 5  # bytes of a frame besides its payload
@@ -24,7 +25,7 @@ PROGRAM = Path(__file__).with_name("board_host.c")
 
 
 class BoardLine:
-    """A board that runs the C of `step_code`, at a serial port or a file descriptor; a context manager.
+    """A board that runs the C of a sampled controller, at a serial port or a file descriptor; a context manager.
 
     wait: s until a frame is sent again, at most `retries` times. wrong_crc, skipped, repeated: frames with a wrong CRC,
     bytes outside of frames, and frames that were sent again, until now. The board takes a repeated step once.
@@ -35,7 +36,7 @@ class BoardLine:
     def __init__(
         self,
         port: str | os.PathLike[str] | int,
-        code: StepCode,
+        code: SampledCode,
         *,
         baud: int = 115200,
         wait: float = 1.0,
@@ -44,7 +45,7 @@ class BoardLine:
         self._wait = number("BoardLine", "wait", wait, unit="s", above=0.0)
         self._retries = whole("BoardLine", "retries", retries, least=0)
         whole("BoardLine", "baud", baud, least=1)
-        self._code = instance("BoardLine", "code", code, StepCode)
+        self._code = instance("BoardLine", "code", code, SampledCode)
         self._name = str(port)
         self._type = np.dtype("<f8" if code.real == "double" else "<f4")
         most = 255 // self._type.itemsize
@@ -148,7 +149,7 @@ def framed(sequence: int, payload: bytes) -> bytes:
 
 
 def emulated_board(
-    code: StepCode, *, wait: float = 1.0, retries: int = 2
+    code: SampledCode, *, wait: float = 1.0, retries: int = 2
 ) -> AbstractContextManager[BoardLine]:
     """The board's program, compiled by the C compiler of this computer, behind a pseudo-terminal (Linux, macOS).
 
@@ -156,16 +157,17 @@ def emulated_board(
     """
     number("emulated_board", "wait", wait, unit="s", above=0.0)
     whole("emulated_board", "retries", retries, least=0)
-    return _emulated(instance("emulated_board", "code", code, StepCode), wait, retries)
+    return _emulated(instance("emulated_board", "code", code, SampledCode), wait, retries)
 
 
 @contextmanager
-def _emulated(code: StepCode, wait: float, retries: int) -> Iterator[BoardLine]:
+def _emulated(code: SampledCode, wait: float, retries: int) -> Iterator[BoardLine]:
     command = c_compiler()
     if command is None:
         raise ModelError("emulated_board: found no C compiler, expected cc, gcc or clang; install one")
     with tempfile.TemporaryDirectory(prefix="gantrytau-") as folder:
         code.write(folder)
+        write_line(folder)
         program = Path(folder) / "board"
         # a fused multiply-add would round differently from one processor to the next
         flags = ["-std=c99", "-O2", "-ffp-contract=off", "-I", folder, "-o", str(program)]

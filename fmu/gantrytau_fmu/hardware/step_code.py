@@ -11,6 +11,7 @@ import casadi as ca
 
 from gantrytau import Model, translate
 from gantrytau.answers.instant_function import sample_function
+from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import check_words, instance
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau.language.instructions import computed
@@ -45,35 +46,26 @@ void controller_step(controller_state *state, const controller_real *given, cont
 """
 
 
-@dataclass(frozen=True)
-class StepCode:
-    """C of a sampled controller, and the same step as a function of CasADi.
+@dataclass(frozen=True, kw_only=True)
+class StepCode(SampledCode):
+    """C of a sampled model, and the same step as a function of CasADi.
 
-    given, find: names of scalars in the order of the arrays; function: (given, held) -> (find, held behind); start:
-    of what is held; period: s; real: type of C; header, source: texts of `controller.h` and `controller.c`.
+    function: (given, held) -> (find, held behind); start: of what is held.
     """
 
-    given: tuple[str, ...]
-    find: tuple[str, ...]
     function: ca.Function
     start: tuple[float, ...]
-    period: float
-    real: Literal["double", "float"]
-    header: str
-    source: str
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write `controller.h`, `controller.c` and `board_line.h`, the serial protocol, into a folder; their paths."""
-        target = Path(folder)
-        target.mkdir(parents=True, exist_ok=True)
-        texts = {
-            "controller.h": self.header,
-            "controller.c": self.source,
-            LINE_HEADER.name: LINE_HEADER.read_text(encoding="utf-8"),
-        }
-        for name, text in texts.items():
-            (target / name).write_text(text, encoding="utf-8", newline="\n")
-        return [target / name for name in texts]
+        return [*super().write(folder), write_line(folder)]
+
+
+def write_line(folder: str | os.PathLike[str]) -> Path:
+    """Write `board_line.h`, the serial protocol of a board, into a folder; its path."""
+    target = Path(folder) / LINE_HEADER.name
+    target.write_text(LINE_HEADER.read_text(encoding="utf-8"), encoding="utf-8", newline="\n")
+    return target
 
 
 def step_code(
@@ -118,7 +110,10 @@ def step_code(
     )  # fmt: skip
     period = dae.number(dae.flat.sampled[0].period)
     source = _source(function, start)
-    return StepCode(tuple(names[0]), tuple(names[1]), function, start, period, real, header, source)
+    return StepCode(
+        given=tuple(names[0]), find=tuple(names[1]), function=function, start=start, period=period, real=real,
+        header=header, source=source,
+    )  # fmt: skip
 
 
 def _source(function: ca.Function, start: Sequence[float]) -> str:

@@ -201,11 +201,13 @@ static gt_status gt_jump_fails(gt_instance *it, const char *name) {
 static gt_status gt_act(gt_instance *it, gt_event_info *info, int *acted) {
     double found[GT_ROOM(GT_WHENS + GT_DISCRETES + GT_REINITS)];
     double *const discretes = it->now.u + GT_INPUTS + GT_HELD_COUNT;
-    int holds[GT_ROOM(GT_WHENS)], i;
+    int holds[GT_ROOM(GT_WHENS)], first = 0, i;
     gt_status status = gt_find_conditions(it, holds);
     *acted = 0;
     if (status != GT_OK) return status;
+    for (i = 0; i < GT_WHENS; i++) first |= holds[i] && !it->now.holds[i] && !gt_when_waits[i];
     for (i = 0; i < GT_WHENS; i++) {
+        holds[i] &= !(first && gt_when_waits[i] && !it->now.holds[i]); /* what waits for others has not become true yet */
         it->e[i] = holds[i] && !it->now.holds[i];
         *acted |= it->e[i] != 0;
         if (it->e[i] != 0) it->last_event = gt_when_names[i];

@@ -68,7 +68,9 @@ def learn(
             found = learn_cases(rig, folder=output, force=force, progress=tell)
         files = [] if output is None else kept(found, output)
         cases = (f"Case {name}. {history}\n" for name, history in found.histories.items())
-        answered(json, {"cases": summary(found)}, "\n".join([*cases, str(found)]), files)
+        answered(
+            json, {"cases": summary(found), "fitted": found.fitted}, "\n".join([*cases, str(found)]), files
+        )
 
 
 @contextmanager

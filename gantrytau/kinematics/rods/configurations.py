@@ -16,8 +16,6 @@ from gantrytau.kinematics.rods.rod_robots import RodRobot, SixRods, ThreeRods, T
 SAME = 1e-6  # m or rad between solutions that are one
 GRID = 24  # starts around a turn of each turntable
 
-SIDES = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
-
 
 @dataclass(frozen=True, eq=False)
 class Configuration(Record):
@@ -65,7 +63,7 @@ def of_pose(robot: RodRobot, at: Poses, limits: np.ndarray) -> list[Configuratio
     if isinstance(robot, TurningRods):
         return _of_turntables(robot, at, limits)
     found = []
-    for sides in SIDES * robot.sides:
+    for sides in np.array(list(itertools.product((1.0, -1.0), repeat=len(robot.sides)))) * robot.sides:
         if isinstance(robot, SixRods) and at.R is None:
             q, R, _ = robot.follow(at.r, sides)
         else:

@@ -1,4 +1,4 @@
-"""Robots on links whose geometry is known: three links, six links, and six links on turntables.
+"""Robots on links whose geometry is known: three links, six links on three or five carts, and six links on turntables.
 
 All share the equations of their links; they differ in what of a pose is free and in what has a closed form.
 Each answers arrays, the first axis the pose: q (N, n), r (N, 3), R (N, 3, 3), with numbers of iterations (N,).
@@ -23,6 +23,10 @@ from gantrytau.kinematics.rods.lengths_by_newton import solve_lengths
 from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import best_rotation
 
+NO_ORIENTATION = (
+    "Kinematics: found {what}, expected one, as this robot can turn its plate; give R of shape (3, 3) or (N, 3, 3), such as "
+    "kinematics.home.R"
+)
 NO_TURN = 1e-9  # of an element of R - I that a plate without rotation may be asked for
 
 
@@ -117,7 +121,7 @@ class RodRobot(Record):
     def single_links(self, q: np.ndarray, R: np.ndarray) -> np.ndarray:
         """The tool (N, 3), were each arm one link; over the plane of the carts where they do not meet."""
         centres, length = self.spheres(q, R)
-        foot, height, _ = meeting(centres, length)
+        foot, height, _ = meeting(centres[:, :3], length[:3])
         upwards = np.sign(height @ self.geometry.direction.sum(axis=0))[:, None]
         return foot + self.ahead * upwards * height
 
@@ -191,7 +195,7 @@ class SixRods(RodRobot):
         if R is None:
             q, _, iterations = self.follow(r, sides)
             return q, iterations
-        A = self.geometry.cart_joints(np.zeros((len(r), 3)))
+        A = self.geometry.cart_joints(np.zeros((len(r), len(self.joints))))
         q = self.mean_carts(self.carts(r, R, A, sides))
         length = self.geometry.slopes(q, r, R)[0]
         miss = np.abs(length - self.geometry.length).max(axis=1)
@@ -238,16 +242,21 @@ class SixRods(RodRobot):
         return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in self.geometry.arms], axis=1)
 
 
+class FiveRods(SixRods):
+    """Six links on five carts, the first three on guideways of their own: two angles of the plate are free."""
+
+    def follow(self, r, sides):
+        """Refused, as no orientation follows from a position."""
+        raise ModelError(NO_ORIENTATION.format(what=f"{len(self.joints)} joints and no orientation R"))
+
+
 class TurningRods(RodRobot):
     """The F1: turntables on two carts give the plate six degrees of freedom (section 4.5)."""
 
     def ik(self, r, R=None, sides=None):
         """Coordinates q and iterations: five degrees (4.25), then Newton arm by arm (4.27) to (4.29)."""
         if R is None:
-            raise ModelError(
-                "Kinematics: found no orientation R, expected one, as this robot can turn its plate; give R of shape "
-                "(3, 3) or (N, 3, 3), such as kinematics.home.R"
-            )
+            raise ModelError(NO_ORIENTATION.format(what="no orientation R"))
         sides = self.sides if sides is None else sides
         q, iterations = np.full((len(r), 6), np.nan), np.zeros(len(r), dtype=int)
         rows = np.flatnonzero(self.geometry.could_reach(r))
@@ -333,8 +342,8 @@ class TurningRods(RodRobot):
 
 
 def robot_on(geometry: RodGeometry, home: Home, tolerance: float) -> RodRobot | None:
-    """The kinematics of three rods to a plate that keeps its orientation, or of six without turntables or with those of
-    an F1: one under the two rods of an arm, two under the three of the next. None for other structures.
+    """The kinematics of three rods to a plate that keeps its orientation, of six on three or five carts, or of six with the
+    turntables of an F1: one under the two rods of an arm, two under the three of the next. None for other structures.
     """
     rods = [len(geometry.links_of(arm)) for arm in geometry.arms]
     if geometry.turntables:
@@ -343,7 +352,7 @@ def robot_on(geometry: RodGeometry, home: Home, tolerance: float) -> RodRobot | 
     elif rods == [1, 1, 1]:
         kind = None if geometry.on_plate.any() or geometry.on_cart.any() else ThreeRods
     else:
-        kind = SixRods if len(rods) == 3 and sum(rods) == 6 and min(rods) > 0 else None
+        kind = {3: SixRods, 5: FiveRods}.get(len(rods)) if sum(rods) == 6 and min(rods) > 0 else None
     return None if kind is None else kind(geometry, home, tolerance)
 
 

@@ -201,12 +201,13 @@ class Examiner:
 
     def _joints_and_orientation(self, r: np.ndarray, R: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Actuators (N, n), NaN rows out of reach, and the orientation (N, 3, 3) that is given or follows."""
-        if R is None and isinstance(self.linked, SixRods):
+        turned = self.kinematics.turning
+        if R is None and isinstance(self.linked, SixRods) and not turned:
             q, R, _ = self.linked.follow(r, self.linked.sides)
             return q, R
         R_home = self.linked.repeated(len(r))
         if R is None:
-            R = R_home if self.geometry.turntables else None
+            R = R_home if turned else None
         return self.kinematics.ik(r, R), R_home if R is None else R
 
     def _strokes_left(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

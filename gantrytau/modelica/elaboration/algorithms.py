@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial, reduce
+from functools import reduce
 from typing import Any
 
 import casadi as ca
@@ -14,12 +14,14 @@ from gantrytau.modelica.conditions import Items, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import action_of, looped
-from gantrytau.modelica.elaboration.values import RecordValue
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
-from gantrytau.modelica.overloaded.operators import function_for
+from gantrytau.modelica.records.assigned import chosen_value, most_rounds, with_part
+from gantrytau.modelica.records.operators import function_for
+from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import Members, holding, references
 
 MOST_ROUNDS = 100_000  # of a `while`
@@ -93,9 +95,9 @@ class Execution:
                 try:
                     if target.parts == ((name, ()),):
                         self._check_shape(name, one)
-                    found = _with(self.known[name], target.parts, one, reader)
+                    found = with_part(self.known[name], target.parts, one, reader)
                     for gone in self.left.values():
-                        found = found if gone is False else _chosen(gone, self.known[name], found, name)
+                        found = found if gone is False else chosen_value(gone, self.known[name], found)
                     self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
@@ -157,10 +159,8 @@ class Execution:
             reader = replace(self.reader, local={**self.reader.local, **self.known, **local})
             test = reader.value(item.condition)
             if isinstance(test, ca.SX):
-                reader.scope.refuse(
-                    item.at,
-                    "found a loop whose length varies, expected 'for' over what is known",
-                )
+                self._unrolled(item, reader, local)
+                return
             if not test:
                 return
             try:
@@ -170,6 +170,18 @@ class Execution:
                     raise
                 return
         self.reader.scope.refuse(item.at, f"found a loop of {MOST_ROUNDS} rounds, expected one that ends")
+
+    def _unrolled(self, item: tree.WhileLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
+        """A `while` of varying length: as many conditions on what it does as it has rounds at most."""
+        count = most_rounds(item, reader)
+        if count is None:
+            words = "found a loop whose length varies, expected 'while i < n' with a known n, a subscript i, and i := i + 1"
+            reader.scope.refuse(item.at, words)
+        once = tree.Branching(item.at, None, None, "if", ((item.condition, item.items),), None)
+        outer = self.left["break"]
+        for _ in range(count):
+            self.run([once], local)
+        self.left["break"] = outer
 
     def _branch(self, item: tree.Branching, reader: Interpreter, local: Mapping[str, Any]) -> None:
         """An `if`: what is known chooses, else all branches are carried out and each value is chosen."""
@@ -182,8 +194,8 @@ class Execution:
         for test, items in reversed(tests):
             other, left = self.known, self.left
             self._carry_out(items, local, before, gone)
-            self.known = {name: _chosen(test, one, other[name], name) for name, one in self.known.items()}
-            self.left = {word: _chosen(test, one, left[word], word) for word, one in self.left.items()}
+            self.known = {name: chosen_value(test, one, other[name]) for name, one in self.known.items()}
+            self.left = {word: chosen_value(test, one, left[word]) for word, one in self.left.items()}
         for word in (word for word, one in self.left.items() if one is True):
             self.left = gone
             raise LeftBlock(word)
@@ -200,43 +212,6 @@ class Execution:
                 lambda a, b: values.binary("and", a, values.unary("not", b)), self.left.values(), True
             )
             self.left[str(left)] = values.binary("or", self.left[str(left)], here)
-
-
-def _chosen(test: Any, then: Any, otherwise: Any, name: str) -> Any:
-    if then is otherwise:
-        return then
-    if then is None or otherwise is None:
-        return None  # not yet known in one branch: told where it is asked for
-    if isinstance(then, np.ndarray) and np.shape(then) == np.shape(otherwise):
-        return np.frompyfunc(partial(_chosen, test, name=name), 2, 1)(then, otherwise)
-    if isinstance(then, RecordValue):
-        each = {n: _chosen(test, one, otherwise[n], n) for n, one in then.items()}
-        return RecordValue(each, then.scope)
-    return values.chosen(test, then, otherwise, smooth=False)
-
-
-def _with(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
-    """A value with another one where a reference points to."""
-    subscripts, rest = parts[0][1], parts[1:]
-    if len(parts) == 1 and not subscripts:
-        return new
-    if not subscripts:
-        inner = parts[1][0]
-        if not isinstance(old, RecordValue) or inner not in old:
-            raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
-        return RecordValue({**old, inner: _with(old[inner], rest, new, reader)}, old.scope)
-    if rest or not isinstance(old, np.ndarray):
-        raise ModelError("found an element of no array of a known size assigned, expected an array")
-    found = old.copy()
-    places = tuple(reader.places(one, size) for one, size in zip(subscripts, old.shape, strict=True))
-    many = [place if isinstance(place, list) else [place] for place in places]
-    shape = tuple(len(place) for place in places if isinstance(place, list))
-    if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
-        raise ModelError(f"found {values.size_words(new)} assigned to {list(shape)}, expected one size")
-    flat = iter(new.flat) if isinstance(new, np.ndarray) else iter([new])
-    for index in np.ndindex(*map(len, many)):
-        found[tuple(axis[k] for axis, k in zip(many, index, strict=True))] = next(flat)
-    return found
 
 
 def stated_by_algorithm(
@@ -288,7 +263,7 @@ def called_class(
     if definition.kind == "record" and (
         made := function_for(scope, "constructor", (*arguments, *named.values()))
     ):
-        return called_class(made, arguments, named, beyond, known)
+        return beyond.call(made, arguments, named)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")

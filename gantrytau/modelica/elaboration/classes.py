@@ -26,15 +26,18 @@ from gantrytau.modelica.conditions import (
     guarded_samples,
     instants,
     is_call,
+    outer_name,
+    own_turn,
     sample_calls,
     sample_name,
     targets,
+    whens_in,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
-from gantrytau.modelica.elaboration.scopes import ClassScope, StatementSection
+from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import (
     AbsentComponent,
     remembers,
@@ -44,7 +47,7 @@ from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
 from gantrytau.modelica.overdetermined.records import closing
-from gantrytau.modelica.references import dotted, nodes_of
+from gantrytau.modelica.references import dotted, nodes_of, whole_name
 
 TAKEN = "a name that is taken, expected another name"
 
@@ -91,10 +94,13 @@ class ModelicaModel(TextClass, Model):
     def equations(self) -> Iterator[Any]:
         yield from _sections(self, initial=False)
         if AT_START in type(self).members():
-            yield WhenChain((at_start((getattr(self, AT_START) == 0,)),))
+            past = at_start((getattr(self, AT_START) == 0,))
+            yield WhenChain((replace(past, waits=True),))
         for name in _followed(self.structure):
             old, turn = (getattr(self, followed_name(kind, name)) for kind in (BEHIND, TURN))
-            yield follows(reduce(getattr, name.split("."), self), old, turn)
+            now: Any = reduce(getattr, name.split("."), cast(Any, self))
+            every = (one.elements() for one in (now, old, turn))
+            yield from map(follows, *every)
         for name, one in self.structure.members.items():
             if one.present and one.is_solved and 0 not in one.shape:
                 yield der(getattr(self, name)) == 0
@@ -167,21 +173,26 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
             add_quantity(body, one, name in held, before.get(name))
         else:
             body[name] = _component(one)
-    tests = (test for item in _whens(structure) for test, _ in item.branches)
+            if {"inner", "outer"} <= one.prefixes:
+                body[outer_name(name)] = Outer(Declared, name)
+    tests = (test for item in whens_in(structure) for test, _ in item.branches)
     for call in (call for test in tests for call in sample_calls(test)):
-        known = structure.is_fixed(call.arguments[0])  # else it is set at the start
-        start = Bound(Modifier(call.arguments[0], scope), structure) if known else 1e60
-        body[sample_name(call)] = Discrete(start, unit="s", description="next instant of sample()")
-    body["_followed"] = (*_followed(structure), *map(sample_name, guarded_samples(_whens(structure))))
+        body[sample_name(call)] = Discrete(1e60, unit="s", description="next instant of sample()")
+    guarded = map(sample_name, guarded_samples(whens_in(structure)))
+    own = {n: tree.ComponentReference(0, ((n, ()),)) for n in _held_by_equations(structure)}
+    integers = (own_turn(n) for n, one in own.items() if structure.values_of(one) is None)
+    followed = _followed(structure)
+    body["_followed"] = tuple(dict.fromkeys((*followed, *integers, *guarded)))
     for name in body["_followed"]:
-        body[followed_name(TURN, name)] = Discrete(0, description=f"parity of the changes of {name}")
-    for name in _followed(structure):
-        body[followed_name(BEHIND, name)] = Discrete(0, description=f"{name} before an instant")
+        words = f"parity of the changes of {name}"
+        body[followed_name(TURN, name)] = Discrete(0, shape=followed.get(name, ()), description=words)
+    for name, shape in followed.items():
+        body[followed_name(BEHIND, name)] = Discrete(0, shape=shape, description=f"{name} before an instant")
     taken = next((n for n in structure.members if isinstance(body.get(n), Discrete) and n not in held), None)
     if taken is not None:
         scope.refuse(structure.members[taken].element.declaration.at, f"found a component '{taken}', {TAKEN}")
     for call in (
-        call for item in _whens(structure) for _, items in item.branches for call in checks_in(items)
+        call for item in whens_in(structure) for _, items in item.branches for call in checks_in(items)
     ):
         body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
@@ -196,7 +207,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
 
 def _asks_for_start(structure: Structure) -> bool:
     """Whether `initial()` stands elsewhere than alone as a condition of `when`."""
-    alone = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
+    alone = {id(one) for item in whens_in(structure) for test, _ in item.branches for one in instants(test)}
     nodes = (node for section in structure.scope.sections for node in nodes_of(section.items))
     calls = (one for one in nodes if isinstance(one, tree.Call) and id(one) not in alone)
     return any(one.function.parts[0][0] == "initial" for one in calls)
@@ -238,8 +249,8 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
                     yield one, Bound(Modifier(item.right, section.scope, at=item.at), structure)
 
 
-def _held(structure: Structure) -> Iterator[str]:
-    """Names of what a `when` sets."""
+def _held_by_equations(structure: Structure) -> Iterator[str]:
+    """Names of Booleans and Integers whose equations ask for values before."""
     asked = _asked_before(structure)
     for section in _all_sections(structure):
         for item in section.items if section.kind == "equation" else ():
@@ -248,15 +259,21 @@ def _held(structure: Structure) -> Iterator[str]:
                 remembers(item, structure) or left.parts[0][0] in asked
             ):
                 yield left.parts[0][0]
-    for item in _whens(structure):
+
+
+def _held(structure: Structure) -> Iterator[str]:
+    """Names of what a `when`, or an equation that asks for values before, sets."""
+    yield from _held_by_equations(structure)
+    for item in whens_in(structure):
         for _, items in item.branches:
             yield from targets(items)
 
 
 def _asked_before(structure: Structure) -> set[str]:
     """Names of the Booleans whose values before an instant are asked for."""
-    tests = {id(one) for item in _whens(structure) for test, _ in item.branches for one in instants(test)}
-    calls = (one for section in structure.scope.sections for one in nodes_of(section.items))
+    tests = {id(one) for item in whens_in(structure) for test, _ in item.branches for one in instants(test)}
+    running = (one for one in structure.scope.sections if one.kind != "initial equation")
+    calls = (one for section in running for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
     asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
     names = {one.parts[0][0] for one in asked if isinstance(one, tree.ComponentReference)}
@@ -266,23 +283,23 @@ def _asked_before(structure: Structure) -> set[str]:
     }
 
 
-def _followed(structure: Structure) -> list[str]:
-    """Names of the variables that need a Discrete with their value before an instant."""
-    branches = [branch for item in _whens(structure) for branch in item.branches]
+def _followed(structure: Structure) -> dict[str, tuple[int, ...]]:
+    """Names and sizes of the variables that need a Discrete with their value before an instant."""
+    branches = [branch for item in whens_in(structure) for branch in item.branches]
     changes = {name for test, items in branches for name in changed_in(test, items)}
     alone = {id(one) for test, _ in branches for one in instants(test)}
     said = [one.element.declaration.modification for one in structure.members.values()]
-    found: list[str] = []
+    found: dict[str, tuple[int, ...]] = {}
     for call in calls_before([said, [section.items for section in structure.scope.sections]]):
-        asked, name = call.function.parts[0][0], dotted(call.arguments[0])
+        asked, name = call.function.parts[0][0], whole_name(call.arguments[0])
         one = structure.leaf(cast(tree.ComponentReference, call.arguments[0]))
-        if one is None or one.is_parameter or one.shape or (asked == "edge" and id(call) in alone):
+        if one is None or one.is_parameter or 0 in one.shape or (asked == "edge" and id(call) in alone):
             continue
         number = one.kind == "Integer" or one.literals is not None
-        beside = asked != "pre" or name in changes or (number and name not in _held(structure))
+        beside = asked != "pre" or name in changes or ((number or one.shape) and name not in _held(structure))
         if beside and (number or one.kind == "Boolean"):
-            found.append(name)
-    return [*dict.fromkeys(found)]
+            found[name] = one.shape
+    return found
 
 
 def _all_sections(structure: Structure) -> Iterator[StatementSection]:
@@ -296,34 +313,19 @@ def _all_sections(structure: Structure) -> Iterator[StatementSection]:
             yield StatementSection("equation", (found,), said.scope)
 
 
-def _whens(structure: Structure) -> Iterator[tree.Branching]:
-    """All `when` among the equations of a class."""
-    left = [item for section in structure.scope.sections for item in section.items]
-    for item in left:
-        if isinstance(item, tree.Branching) and item.word == "when":
-            yield item
-        elif isinstance(item, tree.Branching):
-            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
-        elif isinstance(item, tree.ForLoop):
-            left += item.items
-
-
 def _component(one: ClassMember) -> Any:
     """A component, or an array of components, with what its declaration says."""
     owner = one.owner
     if not one.shape:
         (child,) = one.children
         return _opened(class_of(child), keywords_of(child, one.own, owner))
-    made: dict[int, type[Any]] = {}
-
-    def element(index: int) -> Any:
-        child = one.children[index]
-        made[index] = made[0] if index and not child_differs(one.children[0], child) else class_of(child)
-        return _opened(made[index], keywords_of(child, one.own.of_element(index, len(one.children)), owner))
-
     found = Array(Declared, 0)
-    found.elements = [element(k) for k in range(one.shape[0])]
-    found.component = made[0] if made else Declared
+    found.shape = one.shape
+    for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
+        same = found.elements and not child_differs(one.children[0], child)
+        made: Any = found.component if same else class_of(child)
+        found.component = found.component if found.elements else made
+        found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 

@@ -2,27 +2,29 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import casadi as ca
 import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean, in_words
 from gantrytau.language.functions import logic_or
-from gantrytau.language.symbols import pre, time
+from gantrytau.language.symbols import time
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
-from gantrytau.modelica.elaboration.values import EnumerationValue, RecordValue
+from gantrytau.modelica.elaboration.modifiers import Element
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
-from gantrytau.modelica.overloaded.operators import operator_record, overloaded
+from gantrytau.modelica.records.operators import operated
+from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import (
     Members,
     called_function,
     component_of,
     declared_shape,
-    dotted,
     function_name,
+    whole_name,
 )
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
@@ -51,6 +53,14 @@ class Surroundings(Protocol):
 def changed(new: Any, old: Any) -> Any:
     """Whether a Boolean, Integer or number of an enumeration is another one."""
     return logic_or(new > old + 0.5, new < old - 0.5)
+
+
+def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
+    """The components of a list, or of lists in it, at the places of each dimension."""
+    place, *rest = places
+    many = [place] if isinstance(place, int) else place
+    found = [_elements(components[k], rest) if rest else components[k] for k in many]
+    return found[0] if isinstance(place, int) else found
 
 
 def first_result(value: Any) -> Any:
@@ -97,7 +107,7 @@ class Interpreter:
         except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
-    def _number(self, e: tree.Number) -> Any:
+    def _stated(self, e: tree.Number | tree.BooleanLiteral) -> Any:
         return e.value
 
     def _literal(self, e: tree.StringLiteral) -> str:
@@ -107,28 +117,19 @@ class Interpreter:
             else e.text
         )
 
-    def _boolean(self, e: tree.BooleanLiteral) -> bool:
-        return e.value
-
     def _mark(self, e: tree.Mark) -> Any:
         if e.word != "end" or self.end is None:
             raise ModelError(f"found '{e.word}', expected a value")
         return self.end
 
     def _unary(self, e: tree.Unary) -> Any:
-        operand = self.value(e.operand)
-        if operator_record(operand) is not None:
-            return overloaded(e.operator, [operand], self.library.call)
-        return values.unary(e.operator, operand)
+        return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
         left = self.value(e.left)
         if e.operator in ("and", "or") and left is (e.operator == "or"):
             return left  # the other side may have no value
-        right = self.value(e.right)
-        if operator_record(left) is not None or operator_record(right) is not None:
-            return overloaded(e.operator, [left, right], self.library.call)
-        return values.binary(e.operator, left, right)
+        return operated(e.operator, [left, self.value(e.right)], self.library.call)
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
@@ -218,6 +219,8 @@ class Interpreter:
         if parts[0][0] == "":
             parts = parts[1:]
         found = here.first(parts[0][0])
+        if found is None and (known := here.imported_literal(parts[0][0])) is not None:
+            found, parts = known[0], [parts[0], (known[1], ()), *parts[1:]]
         if found is None:
             name, near = parts[0][0], [*self.local, *self.members.names(), *self.scope.known_names()]
             raise ModelError(f"found the name '{name}', expected a declared one{did_you_mean(name, near)}")
@@ -271,24 +274,19 @@ class Interpreter:
         """The elements of an array or list that subscripts choose."""
         if not subscripts:
             return value
-        shape = (
-            (len(value),)
-            if isinstance(value, list)
-            else np.shape(value if isinstance(value, np.ndarray) else 0)
-        )
+        shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
-        if isinstance(value, np.ndarray) and value.size and any(map(self._varies, subscripts, shape)):
+        if isinstance(value, np.ndarray) and value.size and any(map(self.varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
         if isinstance(value, list):
-            (place,) = places
-            return value[place] if isinstance(place, int) else [value[k] for k in place]
+            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value
 
-    def _varies(self, subscript: tree.Expression, size: int) -> bool:
+    def varies(self, subscript: tree.Expression, size: int) -> bool:
         """Whether a subscript is known while a model runs only."""
         if isinstance(subscript, (tree.Mark, tree.Number)):
             return False
@@ -298,7 +296,7 @@ class Interpreter:
     def _chosen(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
         """The elements of an array at places of which some vary; beyond the array no number, which ends a run."""
         (first, *rest), size = subscripts, len(value)
-        if not self._varies(first, size):
+        if not self.varies(first, size):
             chosen = self.places(first, size)
             each = [self.indexed(value[k], rest) for k in ([chosen] if isinstance(chosen, int) else chosen)]
             return each[0] if isinstance(chosen, int) else values.array(each)
@@ -349,7 +347,7 @@ class Interpreter:
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
-        if before and (name_of := dotted(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
+        if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = called_function(e, self)
         arguments = [inner.value(one) for one in e.arguments]
@@ -364,26 +362,28 @@ class Interpreter:
 
     def _before(self, asked: str, e: tree.Expression) -> Any:
         """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""
-        name = dotted(e)
+        name = whole_name(e)
         inside = self.following is not None and name in self.following
         old = self.members.before(name, "edge" if inside else asked) if name else None
         if self.settled and (asked == "pre" or old is None):
             return self.value(e) if asked == "pre" else False
         if old is None:
             return None
-        old, new = old if self.following is None else pre(old), self.value(e)
+        old = self.indexed(old, cast(tree.ComponentReference, e).parts[-1][1])
+        old, new = old if self.following is None else values.called("pre", [old], {}), self.value(e)
         if asked == "pre":
             return old
-        return new > old + 0.5 if asked == "edge" else changed(new, old)
+        test = changed if asked == "change" else lambda a, b: a > b + 0.5
+        return np.frompyfunc(test, 2, 1)(new, old) if isinstance(new, np.ndarray) else test(new, old)
 
     def _partial(self, e: tree.PartialCall) -> Any:
         raise ModelError("found a function as an argument, which is not supported, expected a value")
 
 
 _EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
-    tree.Number: Interpreter._number,
+    tree.Number: Interpreter._stated,
     tree.StringLiteral: Interpreter._literal,
-    tree.BooleanLiteral: Interpreter._boolean,
+    tree.BooleanLiteral: Interpreter._stated,
     tree.Mark: Interpreter._mark,
     tree.Unary: Interpreter._unary,
     tree.Binary: Interpreter._binary,

@@ -75,9 +75,13 @@ class ModelicaLibrary:
         found = [package_in(path, self.root)] if path.is_dir() else _in_file(path, self.root)
         for one in found:
             around = self.root if one.source.base else one.around or self.root
-            if one.definition.name in around.classes:
+            other = around.classes.get(one.definition.name)
+            if other is not None and not other.is_implied:
                 one.refuse(one.definition.at, f"found a second class {one.name}, expected one")
             around.classes[one.definition.name] = one
+            for inner in other.classes.values() if other is not None else ():
+                inner.around = one
+                one.classes.setdefault(inner.definition.name, inner)
         return [one.name for one in found]
 
     @property
@@ -87,7 +91,7 @@ class ModelicaLibrary:
         for one in left:
             _read_all(one)
             left += [inner for inner in one.classes.values() if inner.around is one]
-        return tuple(sorted(one.name for one in left if one.definition.kind in self.kinds))
+        return tuple(sorted({one.name for one in left if one.definition.kind in self.kinds}))
 
     def _found(self, name: str) -> ClassScope:
         return self.root.classes.get(name) or self.root.find_class(name, 0)
@@ -219,7 +223,8 @@ def _in_file(path: Path, root: ClassScope) -> list[ClassScope]:
     for part in (found.within or "").split(".") if found.within else ():
         inner = around.own_class(part)
         if inner is None:  # the package itself is not given
-            inner = around.classes[part] = ClassScope(_empty_package(part), found.source, around)
+            inner = ClassScope(_empty_package(part), found.source, around, is_implied=True)
+            around.classes[part] = inner
         around = inner
     optimica = found.source.optimica
     classes = [with_parameters(one, found.source) if optimica else one for one in found.classes]

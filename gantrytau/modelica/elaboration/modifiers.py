@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.records.record_values import RecordValue
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +47,13 @@ class Modifier:
         """What a modification of an array of so many components says of one of them."""
         inner = {name: one if one.each else one.of_element(index, count) for name, one in self.inner.items()}
         return replace(self, inner=inner, path=(*self.path, (index, count)) if self.value is not None else ())
+
+    def of_elements(self, shape: tuple[int, ...]) -> list["Modifier"]:
+        """What it says of each component of an array, row after row."""
+        found: list[Modifier] = [self]
+        for size in shape:
+            found = [one.of_element(k, size) for one in found for k in range(size)]
+        return found
 
     def of_member(self, name: str) -> "Modifier | None":
         """What is said of a member, by a modification or by the value of the whole record."""
@@ -131,6 +138,33 @@ def read_constraint(*classes: Any) -> Modifier:
     return NOTHING
 
 
+@dataclass(frozen=True, eq=False)
+class Element:
+    """A declared component: its clause, the class that declares it, and how that class and its heirs modify it."""
+
+    clause: tree.ComponentClause
+    declaration: tree.ComponentDeclaration
+    scope: Any
+    modifier: Modifier
+    protected: bool = False
+
+    def under(self, over: Modifier) -> Modifier:
+        """What stays said of it under a modification; what redeclares it keeps its constraint alone, if it has one."""
+        constraint = self.clause.constraint
+        if over.member_clause is None or constraint is None:
+            return self.modifier
+        return read_arguments(constraint.arguments, self.scope)
+
+
+@dataclass(frozen=True, eq=False)
+class StatementSection:
+    """Equations or statements of a class, and the class in which their names are looked up."""
+
+    kind: str
+    items: tuple[tree.EquationOrStatement, ...]
+    scope: Any
+
+
 def _redeclaration(one: tree.Redeclaration, scope: Any) -> tuple[str, Modifier]:
     element = one.element
     whole = Redeclared(element, scope)
@@ -151,6 +185,8 @@ def merged(above: Modifier, below: Modifier) -> Modifier:
     """One modification over another, which stands further in; ModelError where the inner one is final."""
     if below is NOTHING:
         return above
+    if below.final and any(isinstance(step, str) for step in above.path):
+        return below  # a member that has its value whatever that of the whole record is
     if below.final and (above.value is not None or above.redeclared or above.inner):
         above.scope.refuse(above.at, "found a modification of what is declared 'final', expected none")
     inner = dict(below.inner)

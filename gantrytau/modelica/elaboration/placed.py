@@ -13,7 +13,7 @@ from gantrytau.language.declarations import Discrete, Formula
 from gantrytau.language.model import Connector, Declared
 from gantrytau.language.statements import Connection
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, sample_name
+from gantrytau.modelica.conditions import BEHIND, TURN, followed_name, outer_name, sample_name
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.scopes import ClassScope
@@ -64,11 +64,15 @@ class PlacedMembers:
             return self.structure.member(name) if self.structure else None
         if one is not None and 0 in one.shape:
             return np.empty(one.shape, dtype=object) if one.primitive else []
-        found = getattr(self.instance, name)
+        found = getattr(
+            self.instance,
+            outer_name(name) if one is not None and {"inner", "outer"} <= one.prefixes else name,
+        )
         if isinstance(found, ca.SX):
             return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
         if isinstance(found, tuple):
-            return [PlacedMembers(each) for each in found]
+            each = [PlacedMembers(each) for each in found]
+            return each if one is None else values.in_rows(each, one.shape)
         return PlacedMembers(found) if isinstance(found, Declared) else found
 
     def shape(self, name: str) -> tuple[int, ...] | None:
@@ -77,15 +81,18 @@ class PlacedMembers:
     def type_of(self, reference: tree.ComponentReference) -> str:
         return "" if self.structure is None else self.structure.type_of(reference)
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
-        return None if self.structure is None else self.structure.limits(reference)
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
+        return None if self.structure is None else self.structure.values_of(reference)
 
     def is_fixed(self, expression: tree.Expression) -> bool:
         return self.structure is not None and self.structure.is_fixed(expression)
 
     def before(self, name: str, asked: str) -> Any:
         own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
-        return None if own else self._following(BEHIND, name)
+        found = None if own else self._following(BEHIND, name)
+        parts = tuple((part, ()) for part in name.split("."))
+        one = self.structure.leaf(tree.ComponentReference(0, parts)) if self.structure else None
+        return found if found is None or one is None else values.from_casadi(found, one.shape)
 
     def turn(self, name: str) -> Any:
         return self._following(TURN, name)

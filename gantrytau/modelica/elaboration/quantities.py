@@ -117,7 +117,10 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
         elif name in NUMBERS:
             found[name] = Bound(attribute, structure, one.shape)
         elif name in TEXTS:
-            found[TEXTS[name]] = text = structure.folded(attribute.seen_from(structure))
+            text = structure.folded(attribute.seen_from(structure))
+            if isinstance(text, np.ndarray):  # one for each element: kept where all are alike
+                text = text.flat[0] if len(set(text.flat)) == 1 else ""
+            found[TEXTS[name]] = text
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name in ("fixed", "free"):
@@ -165,14 +168,14 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
     for name in names:
         one = child.members.get(name)
         inner = said.of_member(name)
-        if one is None or inner is None or not one.present:
-            continue  # a class that is redeclared, or what is not there
+        if one is None or inner is None or not one.present or (said.value is not None and one.own.final):
+            continue  # a class that is redeclared, what is not there, or has its value whatever the record's is
         if one.primitive is None and not one.shape:
             found[name] = keywords_of(one.children[0], inner, structure)
         elif one.primitive is None:
             found[name] = [
-                keywords_of(x, inner.of_element(k, len(one.children)), structure)
-                for k, x in enumerate(one.children)
+                keywords_of(x, each, structure)
+                for x, each in zip(one.children, inner.of_elements(one.shape), strict=True)
             ]
         elif not one.is_folded and 0 not in one.shape:
             attributes = _attributes(one, without_optimica(one, inner, False), structure)

@@ -3,13 +3,20 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NoReturn
+from typing import NoReturn, cast
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import with_pulses
 from gantrytau.modelica.elaboration import modifiers
-from gantrytau.modelica.elaboration.modifiers import Modifier, merged, read_arguments, read_modification
+from gantrytau.modelica.elaboration.modifiers import (
+    Element,
+    Modifier,
+    StatementSection,
+    merged,
+    read_arguments,
+    read_modification,
+)
 from gantrytau.modelica.optimizations import HORIZON
 from gantrytau.modelica.source import SourceText
 
@@ -20,39 +27,13 @@ class TextError(ModelError):
     """A ModelError with the line of a text in its message."""
 
 
-@dataclass(frozen=True, eq=False)
-class Element:
-    """A declared component: its clause, the class that declares it, and how that class and its heirs modify it."""
-
-    clause: tree.ComponentClause
-    declaration: tree.ComponentDeclaration
-    scope: "ClassScope"
-    modifier: Modifier
-    protected: bool = False
-
-    def under(self, over: Modifier) -> Modifier:
-        """What stays said of it under a modification; what redeclares it keeps its constraint alone, if it has one."""
-        constraint = self.clause.constraint
-        if over.member_clause is None or constraint is None:
-            return self.modifier
-        return read_arguments(constraint.arguments, self.scope)
-
-
-@dataclass(frozen=True, eq=False)
-class StatementSection:
-    """Equations or statements of a class, and the class in which their names are looked up."""
-
-    kind: str
-    items: tuple[tree.EquationOrStatement, ...]
-    scope: "ClassScope"
-
-
 @dataclass(eq=False)
 class ClassScope:
     """A class as a place of names. around: the class in which it stands; replaced: its redeclared classes by name.
 
     more: what a folder adds to a package, as a function of a name; predefined: whether it is of the language, as Real;
-    limit: the class that it replaces, whose constraint modifies it where it has none of its own.
+    limit: the class that it replaces, whose constraint modifies it where it has none of its own; is_implied: whether it is
+    a package that a `within` names, but that is not read yet; heir: the package that inherits it and has its constants.
     """
 
     definition: tree.ClassDefinition
@@ -62,6 +43,8 @@ class ClassScope:
     more: Callable[[str], "ClassScope | None"] | None = None
     predefined: bool = False
     limit: "ClassScope | None" = None
+    is_implied: bool = False
+    heir: "ClassScope | None" = None
     busy: bool = field(default=False, init=False)
 
     def refuse(self, at: int, words: str) -> NoReturn:
@@ -120,13 +103,8 @@ class ClassScope:
             for one in clause.components:
                 if one.name in found:
                     self.refuse(one.at, f"found a second component '{one.name}' of {self.name}, expected one")
-                found[one.name] = Element(
-                    clause,
-                    one,
-                    self,
-                    read_modification(one.modification, self, final="final" in clause.prefixes),
-                    protected,
-                )
+                said = read_modification(one.modification, self, final="final" in clause.prefixes)
+                found[one.name] = Element(clause, one, self, said, protected)
         return found
 
     @cached_property
@@ -147,14 +125,28 @@ class ClassScope:
         body = self.definition.body
         if isinstance(body, tree.ShortClass):
             yield self._base(body.type, body.at, body.arguments)
-        elif isinstance(body, tree.Composition) and body.extends:
-            self.refuse(
-                self.definition.at,
-                "found 'class extends', which is not supported, expected 'redeclare model A = B' or a class of its own",
-            )
+        elif self.extends_its_name:
+            yield self._former()
         for item in self.items:
             if isinstance(item, tree.Extends):
                 yield self._base(item.type, item.at, item.arguments)
+
+    @property
+    def extends_its_name(self) -> bool:
+        """Whether it is declared by `redeclare class extends`."""
+        return isinstance(self.definition.body, tree.Composition) and self.definition.body.extends
+
+    def _former(self) -> tuple["ClassScope", Modifier]:
+        """The class of its name that the class around it inherits, with the modifications of it."""
+        name, at = self.definition.name, self.definition.at
+        inherited = (base.inherited_class(name) for base, _ in (self.around.bases if self.around else ()))
+        found = next((one.limit or one for one in inherited if one is not None), None)
+        if found is None:
+            return self.refuse(at, f"found '{name}' behind 'extends', expected an inherited class")
+        if not {"replaceable", "redeclare"} & set(found.definition.prefixes):
+            self.refuse(at, f"found {found.name} extended anew, expected a class declared 'replaceable'")
+        modifier = read_arguments(cast(tree.Composition, self.definition.body).arguments, self)
+        return found.redeclared(modifier), modifier
 
     def _base(
         self, name: str, at: int, arguments: tuple[tree.AnyArgument, ...] | None
@@ -163,14 +155,19 @@ class ClassScope:
         base = start.find_class(name, at, inherited=False)
         limits = (self, self.limit) if isinstance(self.definition.body, tree.ShortClass) else ()
         modifier = merged(read_arguments(arguments, start), modifiers.read_constraint(*limits))
-        own = {n: one for n, one in self.classes.items() if "redeclare" in one.definition.prefixes}
-        return base.redeclared(modifier).with_replaced({**own, **self.replaced}), modifier
+        anew = (
+            x
+            for x in self.classes.items()
+            if "redeclare" in x[1].definition.prefixes or x[1].extends_its_name
+        )
+        found = base.redeclared(modifier).with_replaced({**dict(anew), **self.replaced})
+        if base.definition.kind == "package" and (modifier.inner or self.declared or self.heir):
+            found = replace(found, heir=self.heir or self)
+        return found, modifier
 
     def with_replaced(self, classes: Mapping[str, "ClassScope"]) -> "ClassScope":
         """The class with others in the place of those that it holds or inherits under these names."""
-        if not classes:
-            return self
-        return replace(self, replaced={**self.replaced, **classes})
+        return replace(self, replaced={**self.replaced, **classes}) if classes else self
 
     def redeclared(self, modifier: Modifier) -> "ClassScope":
         """The class as a modification that redeclares classes in it makes it."""
@@ -219,11 +216,13 @@ class ClassScope:
     def elements(self) -> dict[str, Element]:
         """All components in the order of their declarations, inherited ones with their modifications."""
         found: dict[str, Element] = {}
-        hidden = [protected for item, protected in self._items if isinstance(item, tree.Extends)]
+        hidden = [False] * self.extends_its_name
+        hidden += [protected for item, protected in self._items if isinstance(item, tree.Extends)]
         for k, (base, modifier) in enumerate(self.bases):
             for name, element in base.elements.items():
                 over = modifier.inner.get(name)
-                element = element if over is None else _modified(element, over)
+                if over is not None:
+                    element = replace(element, modifier=merged(over, element.under(over)))
                 if name in found and found[name].scope.definition.name != HORIZON:
                     self._check_same(found[name], element)
                 found[name] = replace(element, protected=True) if any(hidden[k : k + 1]) else element
@@ -289,6 +288,7 @@ class ClassScope:
         if found is None and self.more is not None:
             found = self.more(name)
             if found is not None:
+                found = found if self.heir is None else replace(found, around=self)
                 self.classes[name] = found
         return found
 
@@ -318,12 +318,15 @@ class ClassScope:
             found = owner.inherited_class(inner)
             if found is not None:
                 return found
-            if item.names != ("*",) and inner not in owner.elements:
-                self.refuse(
-                    item.at,
-                    f"found '{inner}', which {owner.name} does not have{did_you_mean(inner, owner.names())}",
-                )
+            if item.names != ("*",) and inner not in owner.elements and inner not in (owner.literals or ()):
+                hint = did_you_mean(inner, owner.names())
+                self.refuse(item.at, f"found '{inner}', which {owner.name} does not have{hint}")
         return None
+
+    def imported_literal(self, name: str) -> "tuple[ClassScope, str] | None":
+        """The enumeration and the name of its value that an import, here or further out, means by a name."""
+        found = ((one, inner) for one, inner, _ in self.imports(name) if inner in (one.literals or ()))
+        return next(found, None) or (self.around.imported_literal(name) if self.around else None)
 
     def _check_imports(self, name: str) -> None:
         """TextError where two imports of one kind, of single names or of all names, make different things of a name."""
@@ -342,15 +345,18 @@ class ClassScope:
 
     def first(self, name: str, inherited: bool = True) -> "ClassScope | None":
         """The class that a simple name means here or further out."""
+        return next(self._meanings(name, inherited), None)
+
+    def _meanings(self, name: str, inherited: bool) -> Iterator["ClassScope"]:
+        """The classes of a simple name here and further out, the innermost first."""
         here: ClassScope | None = self
         while here is not None:
             found = here.own_class(name) or here.imported(name)
             if found is None and (inherited or here is not self) and not here.busy:
                 found = here.inherited_class(name)
             if found is not None:
-                return found
+                yield found
             here = here.root if "encapsulated" in here.definition.prefixes and here.around else here.around
-        return None
 
     def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
         """The component that a simple name means in a class around this one, and that class."""
@@ -359,6 +365,7 @@ class ClassScope:
             here._check_imports(name)
             for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
                 if inner in owner.elements:
+                    owner = owner.heir or owner
                     return owner, owner.elements[inner]
             here = here.around
         return None
@@ -367,24 +374,21 @@ class ClassScope:
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""
         start, name = (self.root, name[1:]) if name.startswith(".") else (self, name)
         first, *rest = [name] if self.source.base and self.first(name) else name.split(".")
-        found = start.first(first, inherited)
-        if found is None:
-            near = start.known_names()
-            hint = did_you_mean(first, near) if near else "."
-            self.refuse(
-                at,
-                f"found '{name}', expected the name of a class{hint} A library is given by its folder: "
-                "libraries=[...], --library",
-            )
-        for part in rest:
-            inner = found.inherited_class(part)
-            if inner is None:
-                self.refuse(
-                    at,
-                    f"found '{name}', but {found.name} has no class '{part}'{did_you_mean(part, found.names())}",
-                )
-            found = inner
-        return found
+        wrong: tuple[ClassScope, str] | None = None
+        for found in start._meanings(first, inherited):
+            left = rest  # where one is missing, a class further out is meant
+            while left and (inner := found.inherited_class(left[0])) is not None:
+                found, left = inner, left[1:]
+            if not left:
+                return found
+            wrong = wrong or (found, left[0])
+        if wrong is not None:
+            hint = did_you_mean(wrong[1], wrong[0].names())
+            words = f", but {wrong[0].name} has no class '{wrong[1]}'{hint}"
+        else:
+            hint = did_you_mean(first, near) if (near := start.known_names()) else "."
+            words = f", expected the name of a class{hint} A library is given by its folder: libraries=[...], --library"
+        return self.refuse(at, f"found '{name}'{words}")
 
     def known_names(self) -> list[str]:
         """Names of classes that can be said here, for messages."""
@@ -394,7 +398,3 @@ class ClassScope:
             found += [*here.classes]
             here = here.around
         return [*dict.fromkeys(found)]
-
-
-def _modified(element: Element, over: Modifier) -> Element:
-    return replace(element, modifier=merged(over, element.under(over)))

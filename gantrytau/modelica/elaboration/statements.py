@@ -18,12 +18,13 @@ from gantrytau.modelica.conditions import (
     BEFORE,
     Items,
     is_call,
+    own_turn,
 )
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, first_result
 from gantrytau.modelica.elaboration.kinds import check_type, fits, type_of
 from gantrytau.modelica.elaboration.scopes import TextError
-from gantrytau.modelica.elaboration.whens import chosen_actions, when_chains
+from gantrytau.modelica.elaboration.whens import chosen_actions, follows, when_chains
 from gantrytau.modelica.overdetermined.spanning import asking, is_operator, way
 from gantrytau.modelica.references import Members, nodes_of
 
@@ -45,8 +46,7 @@ def stated(items: Items, reader: Interpreter) -> Iterator[Any]:
 
 def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator[Any]:
     if remembers(item, reader.members) or _is_discrete(item, reader):
-        for left, right in sides(item, reader):
-            yield WhenChain(tuple(_followed(left, right, reader.members.limits(cast(Any, item.left)))))
+        yield from _following(item, reader)
     elif isinstance(item, tree.SimpleEquation):
         _check_types(item, reader)
         reader = replace(reader, settled=True) if _asks_before(item) else reader
@@ -79,15 +79,23 @@ def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool 
         check_type(left, item.right, reader, f"the right side of an equation of {left}", item.right.at)
 
 
-def _followed(left: ca.SX, right: ca.SX, limits: tuple[int, int] | None) -> Iterator[Happening]:
-    """What makes a Boolean, or an Integer between limits, follow an expression that asks for values before."""
-    if limits is None:
-        right = values.condition(right)
-        yield Happening(right, (left == 1,), initially=True)
-        yield Happening(logic_not(right), (left == 0,), initially=True)
-        return
-    for value in range(limits[0], limits[1] + 1):
-        yield Happening(logic_and(right > value - 0.5, right < value + 0.5), (left == value,), initially=True)
+def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenChain]:
+    """What makes a Boolean or Integer follow an expression that asks for values before."""
+    left = cast(tree.ComponentReference, item.left)
+    taken, turn = reader.members.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
+    now = sides(item, replace(reader, settled=True))
+    for (variable, right), (_, settled) in zip(sides(item, reader), now, strict=True):
+        if taken is None:
+            chain = follows(settled, variable, turn, right)
+            yield WhenChain(tuple(replace(one, waits=True) for one in chain.branches))
+            continue
+        if reader.members.type_of(left) == "Boolean":
+            test = values.condition(right)
+            tests = [logic_not(test), test]
+        else:
+            tests = [logic_and(right > k - 0.5, right < k + 0.5) for k in taken]
+        acts = zip(taken, tests, strict=True)
+        yield WhenChain(tuple(Happening(t, (variable == k,), initially=True, waits=True) for k, t in acts))
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:

@@ -14,9 +14,9 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
-from gantrytau.modelica.elaboration.modifiers import NOTHING, Modifier, merged, read_arguments
-from gantrytau.modelica.elaboration.scopes import ClassScope, Element, TextError
-from gantrytau.modelica.elaboration.values import EnumerationValue, is_number
+from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
+from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
+from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
 from gantrytau.modelica.references import references
 from gantrytau.modelica.shaping import ask, ask_for_shapes, is_known
@@ -104,7 +104,7 @@ class Structure:
         if one.is_object and name not in self.objects:
             self.objects[name] = self.folded(one.full)
         if one.primitive is None:
-            return self.objects[name] if one.is_object else one.children if one.shape else one.children[0]
+            return self.objects[name] if one.is_object else in_rows(one.children, one.shape)
         if not one.is_parameter:
             raise ModelError(f"found the variable '{name}', expected what is known at translation")
         if one.full.value is None:
@@ -150,15 +150,13 @@ class Structure:
         one = self.leaf(reference)
         return "" if one is None else one.type_name
 
-    def limits(self, reference: tree.ComponentReference) -> tuple[int, int] | None:
+    def values_of(self, reference: tree.ComponentReference) -> range | None:
         one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
-            return None
+            return range(2)
         said = [one.full.inner.get(name) for name in ("min", "max")]
-        if None in said:
-            raise ModelError(f"found '{one.name}' by its value before, expected its min and max")
-        low, high = (int(self.folded(limit)) for limit in said if limit is not None)
-        return low, high
+        low, high = (None if limit is None else self.folded(limit) for limit in said)
+        return None if low is None or high is None else range(int(low), int(high) + 1)
 
     def is_fixed(self, expression: Any) -> bool:
         return all(is_known(self, one) for one in references(expression))
@@ -176,12 +174,15 @@ class Structure:
 
 @dataclass(eq=False)
 class ClassMember:
-    """A component of an instance. kind: Real, Integer, Boolean, String, or an enumeration; "" for a class."""
+    """A component of an instance. kind: Real, Integer, Boolean, String, or an enumeration; "" for a class.
+
+    first_sizes: those on which its further ones depend, as in A[:, size(A, 1)].
+    """
 
     name: str
     element: Element
     owner: Structure
-    first_sizes: list[int] = field(default_factory=list)  # for further ones, as in A[:, size(A, 1)]
+    first_sizes: list[int] = field(default_factory=list)
 
     @cached_property
     def over(self) -> Modifier:
@@ -364,22 +365,21 @@ class ClassMember:
         if (meant := self._inner()) is not None:
             return meant.children
         clause, scope = self.clause
-        if len(self.shape) > 1:
-            scope.refuse(clause.at, f"found components of {len(self.shape)} dimensions, expected one")
         kind = self.plain_type.redeclared(self.full)
         if "partial" in kind.definition.prefixes and "outer" not in self.prefixes:
-            words = f"found a component of {kind.name}, which is partial, expected a class that extends it"
-            scope.refuse(clause.at, words)
+            words = "which is partial, expected a class that extends it"
+            scope.refuse(clause.at, f"found a component of {kind.name}, {words}")
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        each = [self.full.of_element(k, count) for count in self.shape for k in range(count)]
-        said = each if self.shape else [self.full]
         prefixes = frozenset({"parameter", "constant"} & self.prefixes)
         around: Structure | None = self.owner
         while around is not None and around.scope.definition is not kind.definition:
             around = around.around
         if around is not None:
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
-        return [Structure(kind, one, self.owner.beyond, path, prefixes, self.owner) for one in said]
+        return [
+            Structure(kind, one, self.owner.beyond, path, prefixes, self.owner)
+            for one in self.full.of_elements(self.shape)
+        ]
 
     def _inner(self) -> "ClassMember | None":
         """The component that an `outer` means."""

@@ -16,6 +16,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.events import delay
 from gantrytau.language.functions import fmax, fmin, if_else, logic_and, logic_not, logic_or, mod
 from gantrytau.language.symbols import der, pre
+from gantrytau.modelica.records.record_values import RecordValue, is_plain, record_value
 
 
 class EnumerationValue(int):
@@ -31,27 +32,6 @@ class EnumerationValue(int):
 
     def __repr__(self) -> str:
         return f"{self.type}.{self.literal}"
-
-
-class RecordValue(dict[str, Any]):
-    """The members of a record by name; scope: the class of the record."""
-
-    def __init__(self, members: Mapping[str, Any], scope: Any = None):
-        super().__init__(members)
-        self.scope = scope
-
-
-def record_value(value: Any) -> RecordValue:
-    """A record, or a component that is one, as the values of its members."""
-    if isinstance(value, RecordValue):
-        return value
-    scope = getattr(getattr(value, "structure", None), "scope", None)
-    return RecordValue({n: value.member(n) for n in value.names()}, scope)
-
-
-def is_plain(value: Any) -> bool:
-    """Whether a value is a number, a text, an expression or an array of these."""
-    return isinstance(value, (bool, int, float, str, ca.SX, np.ndarray, np.number))
 
 
 def array(items: Sequence[Any]) -> Any:
@@ -78,6 +58,21 @@ def from_casadi(symbol: ca.SX, shape: tuple[int, ...]) -> Any:
     for place, one in zip(np.ndindex(shape[::-1]), symbol.elements(), strict=True):  # column after column
         found[place[::-1]] = one
     return found
+
+
+def in_rows(items: Sequence[Any], shape: tuple[int, ...]) -> Any:
+    """Components that stand row after row as a list for each dimension; the one of a scalar."""
+    if not shape:
+        return items[0]
+    size = len(items) // shape[0] if shape[0] else 0
+    return [in_rows(items[k * size : (k + 1) * size], shape[1:]) for k in range(shape[0])]
+
+
+def all_sizes(value: Any) -> tuple[int, ...]:
+    """The sizes of an array, also one of components."""
+    if isinstance(value, list):
+        return (len(value), *(all_sizes(value[0]) if value else ()))
+    return np.shape(_shaped(value))
 
 
 def to_casadi(value: Any) -> Any:
@@ -269,7 +264,7 @@ def _reduced(function: Callable[[Any, Any], Any], start: Any) -> Callable[..., A
 
 
 def _size(value: Any, dimension: int | None = None) -> Any:
-    shape = (len(value),) if isinstance(value, list) else np.shape(_shaped(value))
+    shape = all_sizes(value)
     if dimension is None:
         return array(list(shape))
     if not 1 <= dimension <= len(shape):

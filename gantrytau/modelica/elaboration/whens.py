@@ -6,14 +6,14 @@ from functools import reduce
 from typing import Any, cast
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.events import Happening, Reinit, WhenChain, refuse_change, reinit, terminate
-from gantrytau.language.functions import floor, if_else, logic_and, logic_not, logic_or
+from gantrytau.language.functions import ceil, floor, if_else, logic_and, logic_not, logic_or
 from gantrytau.language.symbols import pre, time
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
-    SAMPLE,
     Items,
     changed_in,
     checks_in,
@@ -40,9 +40,11 @@ def when_chains(
         passed = 1 + floor((time - pre(instant)) / period + ROUNDING)  # several where the run begins late
         action = instant == pre(instant) + passed * period
         advance = Happening(time >= instant, (action,), "sample", True)
-        first = at_start((instant == reader.value(call.arguments[0]),))
-        known = reader.members.is_fixed(call.arguments[0])
-        yield WhenChain((advance,) if known else (first, advance))
+        begin = reader.value(call.arguments[0])
+        late = if_else(
+            time > begin, ceil((time - begin) / period - ROUNDING), 0
+        )  # periods before the run begins
+        yield WhenChain((at_start((instant == begin + late * period,)), advance))
         if (turn := reader.members.turn(sample_name(call))) is not None:
             yield WhenChain((replace(advance, actions=(turn == 1 - pre(turn),)),))
     for call in (call for _, items in item.branches for call in checks_in(items)):
@@ -85,14 +87,19 @@ def _happenings(
             yield at_start(actions)
             continue
         edge = cast(tree.Call, one).arguments[0] if is_call(one, "edge") else one
-        found = values.condition(_stays(edge, reader))
+        found = _stays(edge, reader)
+        if isinstance(found, np.ndarray):  # a vector of conditions
+            each = (Happening(values.condition(test), actions) for test in found)
+            yield from each
+            continue
+        found = values.condition(found)
         if isinstance(found, ca.SX):
             refuse_change(found)
         elif found is False:
             found = time < -1e30  # never
         sampled = any(sample_calls(one))
-        turns = map(reader.members.turn, sorted(set(changed_in(one, items))))
-        for each in _both(found, [turn for turn in turns if turn is not None]):
+        turns = map(reader.members.turn, sorted(set(changed_in(edge, items))))
+        for each in _both(found, [one for turn in turns if turn is not None for one in turn.elements()]):
             yield Happening(each, actions, "sample" if sampled else "", sampled)
 
 
@@ -137,9 +144,9 @@ def _by_variable(actions: Iterable[Any]) -> dict[tuple[str, type], tuple[Any, An
     return found
 
 
-def follows(variable: ca.SX, old: ca.SX, turn: ca.SX) -> WhenChain:
-    """What makes a Discrete follow a variable one round later; turn: the parity of its changes."""
-    change, act = changed(variable, old), (old == variable, turn == 1 - pre(turn))
+def follows(value: ca.SX, held: ca.SX, turn: ca.SX, then: ca.SX | None = None) -> WhenChain:
+    """What makes a Discrete follow a value one round later; turn: the parity of its changes; then: that of an action."""
+    change, act = changed(value, held), (held == (value if then is None else then), turn == 1 - pre(turn))
     return WhenChain(tuple(Happening(test, act, initially=True) for test in _both(change, [turn])))
 
 
@@ -171,18 +178,4 @@ def begun(stated: Any, firsts: Sequence[ca.SX]) -> Any:
     names = {one.dep(0).name() for action in actions for one in action.elements() if one.dep(0).is_symbolic()}
     scalars = (scalar for one in firsts for scalar in one.elements())
     own = tuple(one for one in scalars if one.dep(0).name() in names)
-    sampled = next((one for one in stated.branches if one.words == "sample"), None)
-    first = tuple(_first_actions(own, sampled)) if own and sampled is not None else own
-    return WhenChain((at_start(first), *stated.branches)) if own else stated
-
-
-def _first_actions(own: Sequence[ca.SX], sampled: Happening) -> Iterator[ca.SX]:
-    """What is set at the start, and what a sample makes of it where its first instant is the start."""
-    given = {one.dep(0).name(): one for one in own}
-    instants = [one for one in ca.symvar(sampled.condition) if SAMPLE in one.name()]
-    first = ca.substitute(sampled.condition, ca.vertcat(*instants), ca.vertcat(*map(pre, instants)))
-    for scalar in (each for one in sampled.actions if isinstance(one, ca.SX) for each in one.elements()):
-        left = scalar.dep(0)
-        before = given.pop(left.name()).dep(1) if left.name() in given else pre(left)
-        yield left == if_else(first, scalar.dep(1), before)
-    yield from given.values()
+    return WhenChain((at_start(own), *stated.branches)) if own else stated

@@ -7,6 +7,7 @@ consistent, the switches get their sides anew, until no condition becomes true a
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from gantrytau.border.refusal import SolveError
 from gantrytau.simulation import simulation_errors as run_ends
 from gantrytau.simulation.between.chatter import HOP, Chatter
 from gantrytau.simulation.events.crossings import at_zero, location_errors
-from gantrytau.simulation.events.impulses import Impulses, Infinite, turning
+from gantrytau.simulation.events.impulses import Impulses, Infinite, possible_impulses
 from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.rounds import MOST, Made
 from gantrytau.simulation.events.sticking import HOLDS, WHENS
@@ -41,9 +42,10 @@ class Changes:
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
         own = (coordinates.substitutions, tuple(coordinates.arguments), coordinates.states)
-        self._impulses: Impulses | None = coordinates.kept(
-            "impulses", lambda: Impulses(dae, pieces, *own) if turning(dae, pieces) else None
-        )
+        found = coordinates.kept("impulses", lambda: possible_impulses(dae, pieces, *own))
+        self._impulses: Impulses | None = found
+        below = self._impulses.discretes if self._impulses else ()
+        self._below = np.array([name in below for name in coordinates.discretes], dtype=bool)
         free = self._impulses is None and not dae.flat.slips
         self._idle = coordinates.idle if free else np.zeros_like(coordinates.idle)
         timed = coordinates.switches.timed
@@ -185,19 +187,21 @@ class Changes:
             return k
         for _ in range(MOST):
             now = rounds.holding(self.point(k))
-            rose, self._holding = now & ~self._holding, now
+            rose, self._holding = rounds.rising(now, self._holding)
             if not rose.any() or self.ended:
                 return k
             if self.coordinates.dae.flat.slips:
                 waits = self.coordinates.slips.postponed(rose, self.point(k))
-                rose, self._holding = rose & ~waits, now & ~waits
+                rose, self._holding = rose & ~waits, self._holding & ~waits
             made = rounds.made(self.point(k), rose)
             self.acts += made.acts != 0
             acting = [rounds.whens[i] for i in np.flatnonzero(made.acts)]
             for one in acting:
                 if one.failure:
                     raise run_ends.undecided(self.coordinates.dae, float(trail.t[k]), one)
-            self._refuse_bad(made, k)
+            if bad := rounds.not_finite(made, self.coordinates.discretes, self.coordinates.states):
+                labels = rounds.labels(made.acts)
+                raise run_ends.set_badly(self.coordinates.dae, float(trail.t[k]), bad, labels)
             if k == left:
                 trail.repeat(k, written=True)
                 k = k + 1
@@ -205,7 +209,7 @@ class Changes:
                 _, trail.held[left], trail.z[left] = self._unsampled
             trail.show(left, k)
             self._make(made, k, rose)
-        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), self._labels(rose))
+        raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), rounds.labels(rose))
 
     def _make(self, made: Made, k: int, rose: np.ndarray) -> None:
         """Give a place the values of a round, and what follows from them."""
@@ -217,6 +221,7 @@ class Changes:
         idle = (self._idle[own] | (made.discretes == first[own])).all() and self._timed[made.acts != 0].all()
         idle = idle and not any(one.reinits for one in acting)
         before = self.margins(np.array([k])) if len(coordinates.switches) and not idle else None
+        earlier = self.point(k)[3].copy()
         trail.held[k, own] = made.discretes
         if idle:
             return
@@ -225,20 +230,25 @@ class Changes:
             try:
                 trail.x[k] = coordinates.followed(trail.x[k], t, trail.inputs(k))
             except SolveError as error:
-                raise run_ends.inconsistent(coordinates.dae, t, self._labels(made.acts), error) from error
+                labels = coordinates.rounds.labels(made.acts)
+                raise run_ends.inconsistent(coordinates.dae, t, labels, error) from error
         if coordinates.dae.flat.slips:
             if any(one.reinits for one in acting):
                 self._slide_on(k, np.ones(len(coordinates.slips), dtype=bool))
             self._lock(k, first)
+        steps = (made.discretes != first[own])[self._below].any()
+        left = (trail.x[k].copy(), trail.z[k].copy(), t, earlier) if steps else None
         trail.z[k] = self._settled(k)
+        if before is None and left is not None:
+            self._led_to(k, self.modes(k).copy(), 0.0, left)
         if before is not None:
             after = self.margins(np.array([k]))
             models = np.arange(made.acts.size) < made.acts.size - WHENS * len(coordinates.dae.flat.slips)
             self._watch_hops((made.acts != 0) & models, t, before, after)
             errors = location_errors(before, after, t, coordinates.switches.whole(before.values))
             modes = coordinates.switches.following(after.blurred(errors))
-            if not np.array_equal(modes, self.modes(k)):
-                self._agree(k, modes, errors)
+            if left is not None or not np.array_equal(modes, self.modes(k)):
+                self._agree(k, modes, errors, left)
 
     def _lock(self, k: int, first: np.ndarray) -> None:
         """Hold what has come to rest, but what breaks away again at once: that turns back; first: what was held before."""
@@ -273,16 +283,6 @@ class Changes:
         ahead = self.trail.held.shape[1] - self.trail.inputs(k).size
         return slice(slips.modes.start + ahead, slips.modes.stop + ahead)
 
-    def _labels(self, chosen: np.ndarray) -> list[str]:
-        return [one.label for one, some in zip(self.coordinates.rounds.whens, chosen, strict=True) if some]
-
-    def _refuse_bad(self, made: Made, k: int) -> None:
-        """SolveError for a new value that is not finite."""
-        c, bad = self.coordinates, np.flatnonzero(~np.isfinite(np.concatenate([made.discretes, made.states])))
-        if bad.size:
-            names = [*c.discretes, *(c.states[i] for i in c.rounds.places)]
-            raise run_ends.set_badly(c.dae, float(self.trail.t[k]), names[bad[0]], self._labels(made.acts))
-
     def _watch_hops(self, acts: np.ndarray, t: float, before: SwitchMargins, after: SwitchMargins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
         rates, noise = before.rates[0], before.noise[0]
@@ -304,25 +304,22 @@ class Changes:
         w = trail.inputs(k)[None]
         return self.coordinates.settle(trail.x[places], trail.z[places], trail.t[places], w)[0]
 
-    def _agree(self, k: int, modes: np.ndarray, errors: np.ndarray | float = 0.0) -> None:
+    def _agree(self, k: int, modes: np.ndarray, errors: Any = 0.0, left: Point | None = None) -> None:
         """Give a place modes that agree with the margins they lead to, from these on; SolveError if there are none.
 
-        errors: by which margins are known at least.
+        errors: by which margins are known at least; left: the point before Discretes of differentiated equations jumped.
         """
         x, z, t, w = self.point(k)
-        before = x.copy(), z.copy(), t, w.copy()
-        tried = [self.modes(k).copy()]
+        before = left or (x.copy(), z.copy(), t, w.copy())
+        tried = [] if left else [self.modes(k).copy()]
         while not any(np.array_equal(modes, old) for old in tried):
             tried.append(modes)
             modes = self._led_to(k, modes, errors, before)
             if np.array_equal(modes, tried[-1]):
                 return
-            if (
-                len(tried) > LONGEST_CIRCLE
-            ):  # each leads further away, as floor(x) of a loop with a gain above one
-                raise run_ends.no_side(
-                    self.coordinates.dae, float(t), self.conditions(np.flatnonzero(modes != tried[0]))
-                )
+            if len(tried) > LONGEST_CIRCLE:  # each leads further away, as floor(x) with a gain above one
+                changing = np.flatnonzero(modes != tried[0])
+                raise run_ends.no_side(self.coordinates.dae, float(t), self.conditions(changing))
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
         if changing.size <= MOST_AT_ONCE:
@@ -336,7 +333,7 @@ class Changes:
         known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
         if np.any(self._rounded > known):
             self.trail.x[k], self.trail.z[k] = before[:2]
-            self._agree(k, tried[1], errors)
+            self._agree(k, tried[1], errors, left)
             return
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
@@ -375,7 +372,8 @@ class Changes:
         if k == 0:
             trail.x[k] = coordinates.followed(x, t, trail.inputs(k))
             return
-        turned = np.flatnonzero(self.modes(k) != w[w.size - self.modes(k).size :])
+        turned = self.conditions(np.flatnonzero(self.modes(k) != w[w.size - self.modes(k).size :]))
+        turned = turned or impulses.discretes
         behind = trail.inputs(k).copy()
         slips = coordinates.dae.flat.slips
         if slips:  # the impulse of a friction is finite as its force is
@@ -383,9 +381,9 @@ class Changes:
         try:
             found = impulses.behind(before, behind, self.span + abs(t))
         except Infinite as error:
-            raise run_ends.infinite(coordinates.dae, t, self.conditions(turned), error) from None
+            raise run_ends.infinite(coordinates.dae, t, turned, error) from None
         except np.linalg.LinAlgError:
-            raise run_ends.undetermined_jump(coordinates.dae, t, self.conditions(turned)) from None
+            raise run_ends.undetermined_jump(coordinates.dae, t, turned) from None
         self._thrown = found is not None
         trail.x[k] = x if found is None else found
         if slips and found is not None:

@@ -12,6 +12,7 @@ the turn: impacts are plastic. Where J changes by the jump itself, it is led alo
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -36,9 +37,20 @@ class Infinite(Exception):
         self.jumping, self.infinite, self.law = jumping, infinite, law
 
 
+def stepping(dae: Translated, pieces: InModes) -> list[str]:
+    """The Discretes that stand below the highest derivatives: where these take new values, there may be impulses."""
+    leaves = {leaf.name() for leaf in ca.symvar(column(_below(dae, pieces)))}
+    return [name for name in dae.flat.discretes if name in leaves]
+
+
+def _below(dae: Translated, pieces: InModes) -> list[ca.SX]:
+    """The equations that the index reduction differentiated, before it did."""
+    return [e for (i, m), e in pieces.residuals.items() if m < dae.indexed.counts[i]]
+
+
 def turning(dae: Translated, pieces: InModes) -> list[ca.SX]:
     """The modes of the equations, if some stand below the highest derivatives: where these turn, there may be impulses."""
-    below = [e for (i, m), e in pieces.residuals.items() if m < dae.indexed.counts[i]]
+    below = _below(dae, pieces)
     for name, e in pieces.known.items():
         base, order = split_derivative(name)
         if derivative_name(base, order + 1) in pieces.known:
@@ -117,7 +129,7 @@ class Levels:
 
 class Impulses:
     """The jumps of a model. most: the highest level at which something may jump; states: their places among all symbols;
-    symbols, jacobian: all symbols and what is known, at a point, and J, as functions.
+    symbols, jacobian: all symbols and what is known, at a point, and J, as functions; discretes: see `stepping`.
     """
 
     def __init__(
@@ -130,6 +142,7 @@ class Impulses:
     ):
         """ways: substitutions in order, from all symbols to `arguments`: x, z, time, t0, w; the last is that of modes."""
         self.dae, self._outside, self._arguments = dae, ways[-1], arguments
+        self.discretes = stepping(dae, pieces)
         self.levels = levels = Levels(dae, pieces.residuals, tuple(pieces.known))
         known = (order for _, order in map(split_derivative, levels.known))
         self.most = int(levels.counts.max(initial=0)) + max(known, default=0)
@@ -166,6 +179,11 @@ class Impulses:
         for k in range(self.most, 0, -1):
             jump.lead(k)
         return jump.y[self.states] if jump.found else None
+
+
+def possible_impulses(dae: Translated, pieces: InModes, *more: Any) -> Impulses | None:
+    """The jumps of a model; None where nothing turns or takes new values that the index reduction differentiated."""
+    return Impulses(dae, pieces, *more) if turning(dae, pieces) or stepping(dae, pieces) else None
 
 
 class _Jump:

@@ -45,9 +45,29 @@ class Rounds:
         """Whether each condition holds at a point."""
         return self._at(self.conditions, point)[0] != 0
 
+    def rising(self, now: np.ndarray, holding: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which conditions became true, and which hold from now on; those that wait for others count as not yet true.
+
+        now, holding: which conditions hold, and which did when they were looked at last.
+        """
+        rose = now & ~holding
+        waits = rose & [one.waits for one in self.whens]
+        waits = waits if (rose & ~waits).any() else waits & False
+        return rose & ~waits, now & ~waits
+
     def made(self, point: Point, rose: np.ndarray) -> Made:
         """A round at a point where some conditions became true."""
         return Made(*self._at(self.jump, point, rose.astype(float)))
+
+    def not_finite(self, made: Made, discretes: Sequence[str], states: Sequence[str]) -> str:
+        """The name of a new value that is not finite; "" without one."""
+        names = [*discretes, *(states[i] for i in self.places.tolist())]
+        values = np.concatenate([made.discretes, made.states])
+        return next((n for n, value in zip(names, values, strict=True) if not np.isfinite(value)), "")
+
+    def labels(self, chosen: np.ndarray) -> list[str]:
+        """Where some whens are stated, and on what condition."""
+        return [one.label for one, some in zip(self.whens, chosen, strict=True) if some]
 
     @staticmethod
     def _at(function: AtPlaces, point: Point, *more: np.ndarray) -> list[np.ndarray]:

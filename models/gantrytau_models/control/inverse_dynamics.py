@@ -9,6 +9,7 @@ either end, carry a force lambda_i D_i.
 import casadi as ca
 
 from gantrytau import Array, Input, Model, Output, Parameter, Real, dot, tanh
+from gantrytau.border.refusal import ModelError
 from gantrytau_models.control.closed_form_kinematics import ForwardKinematics
 from gantrytau_models.prototypes import Prototype
 
@@ -47,6 +48,13 @@ class InverseDynamics(ForwardKinematics):
     tension = Real(3, unit="N/m", description="force of the links over their lengths, positive if they push")
 
     def _defaults(self, prototype: Prototype) -> dict:
+        if prototype.friction_by_direction():
+            raise ModelError(
+                f"found {prototype.name}, whose friction differs with the direction, expected one number for each cart; "
+                "replace its coulomb and viscous by their means",
+                place=type(self).__name__,
+                argument="prototype",
+            )
         loads = zip(
             prototype.cart_masses, prototype.link_masses, prototype.coulomb, prototype.viscous, strict=True
         )

@@ -7,8 +7,9 @@ side the plate moves as that of the six-link robot does; apart they turn it abou
 from typing import Any
 
 from gantrytau import Array, StateSelect
+from gantrytau.language.self_description.rods import Rods
 from gantrytau.mechanics.translational import Friction, TanhFriction
-from gantrytau_models.mechanisms.clusters import Arm, TwoLinks
+from gantrytau_models.mechanisms.clusters import Arm, TwoLinks, arm_of_rods
 from gantrytau_models.mechanisms.gantry_tau import Cart, driven_carts
 from gantrytau_models.mechanisms.six_link import (
     Plate,
@@ -49,3 +50,8 @@ class FiveDofGantryTau(PlateOnLinks):
             tool=plate_of(prototype),
         )
         super().__init__(defaults, **modifications)
+
+    def rods(self) -> Rods:
+        """The links; joints on a cart have places of their own, so that of the cart is given (4.14)."""
+        arms = [arm_of_rods(i, len(links)) for i, (_, links) in enumerate(CARTS)]
+        return Rods(arms, given=[f"{arm.name}.offset" for arm in arms])

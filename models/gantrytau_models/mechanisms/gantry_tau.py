@@ -22,8 +22,16 @@ from gantrytau.mechanics.multibody import (
     SphericalSpherical,
     World,
 )
-from gantrytau.mechanics.translational import Flange, Force, Friction, Frictionless, TanhFriction
+from gantrytau.mechanics.translational import (
+    AsymmetricFriction,
+    Flange,
+    Force,
+    Friction,
+    Frictionless,
+    TanhFriction,
+)
 from gantrytau_models.prototypes import FlexiblePrototype, Prototype, RotatingPrototype
+from gantrytau_models.quantities import Pair
 
 
 class Arm(Model):
@@ -121,8 +129,9 @@ class GantryTau(Model):
     """The three-link Gantry-Tau robot, driven by the actuator forces `carts[i].f`.
 
     prototype: a record such as `prototypes.L1`; friction: the class of friction of the carts, `TanhFriction`
-    or `LinearFriction`, or None for none. Further keywords modify members. Guideway directions are taken as
-    they are, not normalised: the position of a cart is offset + s * direction.
+    or `LinearFriction`, or None for none; of a record with friction by direction `AsymmetricFriction` or a class of it.
+    Further keywords modify members. Guideway directions are taken as they are, not normalised: the position of a cart is
+    offset + s * direction.
     """
 
     plate_mass = Parameter(unit="kg", min=0.0, description="mass of plate and tool")
@@ -179,8 +188,13 @@ class WrongRecord(ModelError, TypeError):
     """What a robot was given is no record that describes it, or no class of friction."""
 
 
-def _law(friction: type[Friction] | None, coulomb: float, viscous: float) -> Friction:
-    return Frictionless() if friction is None else friction(f_c=coulomb, f_v=viscous)
+def _law(friction: type[Friction] | None, coulomb: float | Pair, viscous: float | Pair) -> Friction:
+    if friction is None:
+        return Frictionless()
+    if issubclass(friction, AsymmetricFriction):
+        pairs = [np.broadcast_to(number, 2).tolist() for number in (coulomb, viscous)]
+        return friction(f_c=pairs[0], f_v=pairs[1])
+    return friction(f_c=coulomb, f_v=viscous)
 
 
 # a record of each kind that robots are made of
@@ -218,6 +232,13 @@ def driven_carts(
         raise WrongRecord(
             f"{robot}: found friction={friction!r}, expected a class such as LinearFriction, or None"
         )
+    if friction and prototype.friction_by_direction():
+        friction = AsymmetricFriction if friction is TanhFriction else friction
+        if not issubclass(friction, AsymmetricFriction):
+            raise WrongRecord(
+                f"{robot}: found friction={friction.__name__} for {prototype.name}, whose friction differs with the "
+                "direction, expected AsymmetricFriction or a class of it; or replace coulomb and viscous by one number each"
+            )
     return [
         dict(m=mass, law=_law(friction, coulomb, viscous))
         for mass, coulomb, viscous in zip(

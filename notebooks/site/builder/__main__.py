@@ -9,6 +9,7 @@ import time
 from notebooks.site.builder.broken_links import broken_links
 from notebooks.site.builder.executed_notebooks import executed_notebooks
 from notebooks.site.builder.gallery.drawn_examples import drawn_examples
+from notebooks.site.builder.generated.classics_page import classics_page
 from notebooks.site.builder.generated.command_page import command_page
 from notebooks.site.builder.generated.error_pages import error_pages
 from notebooks.site.builder.generated.gallery_page import gallery_page
@@ -38,6 +39,7 @@ def main() -> int:
     single = {
         "gallery/index.md": gallery_page(drawn),
         "library/index.md": library_page(),
+        "classics/index.md": classics_page(),
         "command_line/index.md": command_page(),
         "sources/index.md": source_page(),
     }

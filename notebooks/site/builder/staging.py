@@ -36,6 +36,7 @@ GENERATED = (
     "messages",
     "thesis",
     "library",
+    "classics",
     "command_line",
     "sources",
     "gallery",
@@ -145,8 +146,10 @@ def _with_names(text: str) -> str:
 
 
 def _tree_of(page: str) -> str:
-    """The tree below a page of a folder, where others belong to it."""
+    """The notebooks as files for Jupyter, with their outputs, and the tree below their page."""
     if page != "notebooks/index.md":
         return ""
-    names = "\n".join(path.stem for path in sorted(NOTEBOOKS.glob("*.py")))
-    return f"\n```{{toctree}}\n:hidden:\n\n{names}\n```\n"
+    names = [path.stem for path in sorted(NOTEBOOKS.glob("*.py"))]
+    files = ", ".join(f"{{download}}`{name}.ipynb`" for name in names)
+    tree = "\n".join(names)
+    return f"\nFor Jupyter, with their outputs: {files}.\n\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"

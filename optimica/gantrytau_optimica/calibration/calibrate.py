@@ -253,9 +253,9 @@ def _check_columns(robot: NominalRods, measurements: Measurements, start: str) -
             f"calibrate: found measurements of {measurements.q.shape[1]} actuators for {robot.name}, expected "
             f"{expected}, one for each guideway and turntable; check the columns q1, q2, ..."
         )
-    if robot.turntables and start == "linear":
+    if (robot.turntables or len(robot.arms) > 3) and start == "linear":
         raise ModelError(
-            f"expected 'nominal' for {robot.name}; closure is linear in the parameters of linear guideways only",
+            f"expected 'nominal' for {robot.name}; links of a plate that is turned are found from a start nearby only",
             place="calibrate",
             found=Given("start", start),
         )

@@ -18,7 +18,7 @@ from scipy import sparse
 
 RIDGE = 1e-10  # of the largest curvature: a flat objective leaves no input undetermined
 FAR = 1e30  # what PIQP takes for no limit
-ACCURACY = 1e-9
+ACCURACY = 1e-12  # of the inputs this leaves 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,22 +40,33 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), and whether the program was solved."""
+    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), and whether the program was solved, or has no bound."""
 
     x: np.ndarray
     u: np.ndarray
     slack: np.ndarray
     solved: bool
+    unbounded: bool = False
 
 
 class HorizonProgram:
     """The program for one number of stages, solved again and again.
 
-    soft (rows,): which rows of a stage are; finite (2, rows): whether they have a lower and an upper end.
+    soft (rows,): which rows of a stage are; finite (2, rows): whether they have a lower and an upper end; ridge: of the
+    largest curvature, added to all.
     """
 
-    def __init__(self, stages: int, nx: int, nu: int, soft: np.ndarray, finite: np.ndarray, penalty: float):
-        self.stages, self.nx, self.nu, self.penalty = stages, nx, nu, penalty
+    def __init__(
+        self,
+        stages: int,
+        nx: int,
+        nu: int,
+        soft: np.ndarray,
+        finite: np.ndarray,
+        penalty: float,
+        ridge: float = RIDGE,
+    ):
+        self.stages, self.nx, self.nu, self.penalty, self.ridge = stages, nx, nu, penalty, ridge
         self.slack = bool(soft.any())
         self.each = nx + nu + self.slack
         # a soft row is one for each of its ends
@@ -74,7 +85,7 @@ class HorizonProgram:
     def solve(self, stage: Stage, P: np.ndarray, p: np.ndarray, first: np.ndarray) -> Found:
         """Changes that solve it. P, p: of the last state; first (nx,): the change of the first one, which is known."""
         n, nx, nu, each, slack = self.stages, self.nx, self.nu, self.each, self.slack
-        ridge = RIDGE * max(
+        ridge = self.ridge * max(
             float(np.abs(stage.H).max(initial=0.0)), float(np.abs(P).max(initial=0.0)), 1e-300
         )
         H = np.zeros((n, each, each))
@@ -114,7 +125,7 @@ class HorizonProgram:
             self._solver.setup(*terms)
         else:
             self._solver.update(*terms)
-        solved = self._solver.solve() == piqp.Status.PIQP_SOLVED
+        status = self._solver.solve()
         v = np.array(self._solver.result.x)
         parts = v[: n * each].reshape(n, each)
         x = np.vstack([parts[:, :nx], v[n * each :]])
@@ -122,7 +133,8 @@ class HorizonProgram:
             x,
             parts[:, nx : nx + nu],
             parts[:, -1] if slack else np.zeros(n),
-            bool(solved and np.isfinite(v).all()),
+            bool(status == piqp.Status.PIQP_SOLVED and np.isfinite(v).all()),
+            status == piqp.Status.PIQP_DUAL_INFEASIBLE,
         )
 
 

@@ -8,13 +8,21 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau import ModelError, Result
-from gantrytau.border.checks import array, instance, number, one_of, whole
+from gantrytau.answers.sampled_code import SampledCode
+from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
-from gantrytau_optimica.control.build import build
-from gantrytau_optimica.control.control_problem import ControlProblem
+from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
+from gantrytau_optimica.predictive.horizon_checks import (
+    check_bounded,
+    check_plan,
+    doubt_deadline,
+    doubt_samples,
+)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
     StepTimes,
@@ -24,8 +32,8 @@ from gantrytau_optimica.predictive.plan import (
 )
 from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
+from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
 from gantrytau_optimica.problem.optimization import Optimization
-from gantrytau_optimica.problem.read_problem import read_problem
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
 STANDS = 1e-9  # changes of scaled variables by which iterations are done
@@ -47,8 +55,15 @@ class Mpc:
     until nothing changes. delay: periods from a measurement until its inputs are applied, 0 or 1; the state is foretold to
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
+    disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
+    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
+    objective is least at the set point (Pannocchia, Rawlings, 2003).
+    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
+    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
+    or [1, 1, 2, 4], the last one to the end.
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
-    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events.
+    Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
+    without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """
 
     def __init__(
@@ -63,6 +78,11 @@ class Mpc:
         iterations: int | Literal["converged"] = 1,
         delay: int = 0,
         deadline: float | None = None,
+        disturbance: Sequence[str] = (),
+        parameters: Sequence[str] = (),
+        rates: Mapping[str, Any] | None = None,
+        step_penalty: Mapping[str, float] | None = None,
+        blocks: int | Sequence[int] = 1,
         guess: Mapping[str, Any] | Result | Answer | None = None,
     ):
         self.period = number("Mpc", "period", period, unit="s", above=0.0)
@@ -77,14 +97,21 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self._stages = _staged(problem, self.period)
+        self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self.name = self.built.read.name
+        check_bounded(self.stages)
+        doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
-        weight = PENALTY * self._stages.curvature if penalty is None else penalty
-        finite = np.isfinite(self._stages.rows)
-        self._program = HorizonProgram(self.elements, self._stages.nx, self._stages.nu, soft, finite, weight)
-        self._terminal = Terminal(self._stages)
-        self._steady = SteadyState(self._stages) if terminal == "lqr" else None
+        weight = PENALTY * self.stages.curvature if penalty is None else penalty
+        finite = np.isfinite(self.stages.rows)
+        self.moves = moves = Moves(self.stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        nx = self.stages.nx + (self.stages.nu if moves.wanted else 0)
+        limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
+        soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
+        self._penalty = weight
+        self._program = HorizonProgram(self.elements, nx, self.stages.nu, soft, finite, weight)
+        self.terminal = Terminal(self.stages)
+        self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
         self._prepared: tuple[float, Linear] | None = None
@@ -93,21 +120,26 @@ class Mpc:
         self._missed = 0
         self.status: Status | None = None
         self.softened: tuple[str, ...] = ()  # limits that the last plan passes
-        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def __repr__(self) -> str:
-        counts = f"{self._stages.nx} states, {self._stages.nu} inputs"
+        counts = f"{self.stages.nx} states, {self.stages.nu} inputs"
         return f"<Mpc {self.name}: {self.elements} periods of {self.period:g} s, {counts}>"
 
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the states, all of which `step` wants."""
-        return tuple(s.name for s in self._stages.phase.states)
+        return tuple(s.name for s in self.stages.phase.states)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs that `step` gives."""
-        return tuple(s.name for s in self._stages.phase.inputs)
+        return tuple(s.name for s in self.stages.phase.inputs)
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of disturbances and parameters that `step` takes beside the state."""
+        return tuple(self._estimates)
 
     @property
     def timing(self) -> StepTimes:
@@ -119,25 +151,28 @@ class Mpc:
         """All variables of the model over the horizon as planned at the last step, inputs as they are held."""
         if self._plan is None:
             raise ModelError("there is no plan before the first step", place=self.name)
-        return motion_result(self.built, self._stages, self._plan, self.period, f"{self.name}, planned")
+        return motion_result(self.built, self.stages, self._plan, self.period, f"{self.name}, planned")
 
     def step(self, measured: Mapping[str, Any], t: float = 0.0) -> dict[str, float]:
         """The inputs to hold from now on, with delay=1 from the next sample on, by name.
 
-        measured: the state by names, at time t in s. What is not finite is taken as the plan foretold it, and `.status` says
-        "lost". ModelError for names that are no states, and for a first measurement that is not finite.
+        measured: the state by names, at time t in s, and estimates of what `.estimated` names, kept where they are left out.
+        What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
+        states, and for a first measurement that is not finite.
         """
         begin = time.perf_counter()
-        x, lost = self._state(measured)
+        (x, lost), reached = self._state(measured), True
         if self.delay:
-            x, t = self._later(x, t), t + self.period
+            x, reached = self._later(x, t)
+            t += self.period
         before = self._plan
-        plan, solved, change = self._iterated(x, t)
+        plan, solved, change = self._iterated(x, t) if reached else (self._first(x, t), False, math.inf)
         late = before is not None and time.perf_counter() - begin > self.deadline
         kept = plan if before is None else before.shifted(t, self.period)
         self._plan = plan if solved else None if before is None else kept
         held = kept.u[0] if late or not solved else plan.u[0]
-        self._applied = np.clip(held, self._stages.lower_u, self._stages.upper_u)
+        held = self.moves.reached(held, self._applied)
+        self._applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
         self._missed += late
         wanting = self._converged and change >= STANDS
         words: dict[Status, bool] = {
@@ -149,6 +184,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
+        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
@@ -162,12 +198,16 @@ class Mpc:
             else:
                 linear = self._linear(plan)
             found = self._solved(plan, linear, x)
+            if first and found.unbounded:
+                check_plan(self.stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
             self.softened = self._passed(found)
             if change < STANDS:
                 break
+        if first:
+            check_plan(self.stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
@@ -180,12 +220,12 @@ class Mpc:
 
     def _linear(self, plan: PlannedMotion) -> Linear:
         times = plan.t + self.period * np.arange(self.elements)
-        return self._stages.linear(plan.x[:-1], plan.w, plan.u, times)
+        return self.stages.linear(plan.x[:-1], plan.w, plan.u, times)
 
     def reset(self) -> None:
         """Forget the plan: the next step makes a first one."""
         self._plan = self._prepared = None
-        self._applied = np.clip(np.zeros(self._stages.nu), self._stages.lower_u, self._stages.upper_u)
+        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def run(
         self,
@@ -195,51 +235,56 @@ class Mpc:
         start: Mapping[str, Any] | None = None,
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
+        estimator: StateEstimator | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
         plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit.
+        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
+        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
         """
+        if estimator is not None:
+            instance("run", "estimator", estimator, StateEstimator, "a MovingHorizon or an ExtendedKalman")
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
         other = (
-            _staged(plant, step)
+            _staged(plant, step)[:2]
             if plant is not None
             else (self.built, HorizonStages(self.built.problem, step))
         )
-        return closed_loop(self, other, stop, start or {}, noise or {}, seed)
+        return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
+
+    def c_code(self) -> SampledCode:
+        """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
+
+        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        ModelError for courses, and for terminal="lqr" with a state of rest that moves.
+        """
+        unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
+        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
 
     @property
     def held(self) -> dict[str, float]:
         """The inputs that are applied now, by name."""
-        return dict(zip(self.inputs, (self._applied * self._stages.sizes_u).tolist(), strict=True))
+        return dict(zip(self.inputs, (self._applied * self.stages.sizes_u).tolist(), strict=True))
 
     def whole_state(self, values: Mapping[str, Any]) -> np.ndarray:
         """All states in their units, in the order of `states`; errors of `step`."""
-        return self._state(values)[0] * self._stages.sizes_x
+        return self._state(values)[0] * self.stages.sizes_x
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
-        flat, found = self.built.read.dae.flat, {}
-        instance(
-            self.name, "measured", measured, Mapping, "a mapping from the names of states to their values"
-        )
-        for name, value in measured.items():
-            elements = flat.expand(name)
-            unknown = [one for one in elements if one not in self.states]
-            if unknown:
-                words = f"expected the states {', '.join(self.states)}{did_you_mean(unknown[0], self.states)}"
-                raise ModelError(words, place=self.name, found=Given("measured", name))
-            shape = (len(elements),) if len(elements) > 1 else ()
-            values = array(self.name, name, value, shape, finite=False)
-            found.update(zip(elements, np.ravel(values), strict=True))
+        names = (*self.states, *self.estimated)
+        found = named_values(self.built.read.dae.flat, self.name, "measured", measured, names, finite=False)
+        self._estimates |= {
+            name: found[name] for name in self.estimated if math.isfinite(found.get(name, math.nan))
+        }
         missing = [name for name in self.states if name not in found]
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
             raise ModelError(words, place=self.name)
-        x = np.array([found[name] for name in self.states], dtype=float) / self._stages.sizes_x
+        x = np.array([found[name] for name in self.states], dtype=float) / self.stages.sizes_x
         lost = not np.isfinite(x).all()
         if lost:
             if self._plan is None:
@@ -248,33 +293,42 @@ class Mpc:
             x = np.where(np.isfinite(x), x, foretold)
         return x, lost
 
-    def _later(self, x: np.ndarray, t: float) -> np.ndarray:
-        """The state a period later with the inputs held that are applied now."""
+    def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
+        """The state a period later with the inputs held that are applied now, and whether the motion goes there."""
         plan = self._first(x, t) if self._plan is None else self._plan
-        return self._stages.moved(x, plan.w[0], self._applied, t)[self._stages.last]
+        try:
+            return self.stages.moved(x, plan.w[0], self._applied, t)[self.stages.last], True
+        except ModelError:
+            return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
         """A plan to begin with: at rest, or the guess."""
-        plan = first_plan(self._stages, self.elements, x, t)
-        return plan if self._guess is None else guessed_plan(self._stages, plan, self._guess)
+        plan = first_plan(self.stages, self.elements, x, t)
+        return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
 
     def _solved(self, plan: PlannedMotion, linear: Linear, x: np.ndarray) -> Found:
-        stages = self._stages
+        stages = self.stages
         lower, upper = stages.rows
-        H, g = self._terminal.added(linear, plan)
+        H, g = self.terminal.added(linear, plan)
         P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
-        if self._steady is not None:
-            P, rest = self._steady.at(plan.t + self.elements * self.period, plan.x[-1])
+        if self.steady is not None:
+            P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
             p = P @ (plan.x[-1] - rest)
         stage = Stage(
             H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
             stages.lower_u - plan.u, stages.upper_u - plan.u,
         )  # fmt: skip
-        return self._program.solve(stage, P, p, x - plan.x[0])
+        first = x - plan.x[0]
+        if not self.moves.wanted:
+            return self._program.solve(stage, P, p, first)
+        stage, none = self.moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
+        P = np.pad(P, (0, stages.nu))
+        found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
+        return self.moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""
-        names = self._stages.row_names
+        names = self.stages.row_names
         if isinstance(hard, str):
             one_of("Mpc", "hard", hard, ("none", "all"))
             return np.full(len(names), hard == "none")
@@ -286,17 +340,19 @@ class Mpc:
 
     def _passed(self, found: Found) -> tuple[str, ...]:
         """Words of the soft limits, where the plan passes one."""
-        passed = zip(self._stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
+        passed = zip(self.stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
         return tuple(dict.fromkeys(name for name, so in passed if so))
 
 
-def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
-    """The problem in states, algebraics and inputs, and its stages; ModelError for what no receding horizon can have."""
-    read = read_problem(problem)
-    built = build(read, {}, (), {}, "forward")
-    found: ControlProblem = built.problem
-    if len(found.phases) > 1:
-        raise ModelError("phases are not for a receding horizon, expected one problem", place=read.name)
+def _staged(
+    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
+) -> tuple[Any, HorizonStages, dict[str, float]]:
+    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
+    horizon can have.
+    """
+    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
+    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
+    read, found = built.read, built.problem
     if found.free:
         names = ", ".join(n.name for n in found.free)
         raise ModelError(
@@ -306,4 +362,4 @@ def _staged(problem: Any, period: float) -> tuple[Any, HorizonStages]:
         )
     if not any(phase.inputs for phase in found.phases):
         raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, HorizonStages(found, period)
+    return built, HorizonStages(found, period), estimates

@@ -69,13 +69,26 @@ class HorizonStages:
         return slice(self.nx + self.nz, 2 * self.nx + self.nz)
 
     @cached_property
-    def curvature(self) -> float:
-        """The largest curvature of the cost of a stage at the guess, 1 if there is none."""
+    def _curvatures(self) -> np.ndarray:
+        """Second derivatives of the integrand at the guess, by the signals that it has curvature in."""
         x = np.array([s.guess(np.zeros(1))[0] for s in self.phase.states]) / self.sizes_x
         z = np.array([s.guess(np.zeros(1))[0] for s in self.phase.algebraics]).reshape(self.nz) / self.sizes_z
         zero = np.zeros(1)
-        found = self._point(np.concatenate([x, z, np.zeros(self.nu)]), 0.0, self.course_values(zero))[3]
-        largest = self.step * float(np.abs(np.asarray(found)).max(initial=0.0))
+        return np.asarray(
+            self.point(np.concatenate([x, z, np.zeros(self.nu)]), 0.0, self.course_values(zero))[3]
+        )
+
+    @property
+    def input_curvatures(self) -> np.ndarray:
+        """Second derivatives of the integrand by each input (nu,), scaled, at the guess."""
+        found = np.zeros(self.nx + self.nz + self.nu)
+        found[self.costly] = np.diag(self._curvatures)
+        return found[self.nx + self.nz :]
+
+    @property
+    def curvature(self) -> float:
+        """The largest curvature of the cost of a stage at the guess, 1 if there is none."""
+        largest = self.step * float(np.abs(self._curvatures).max(initial=0.0))
         return largest if 0.0 < largest < np.inf else 1.0
 
     def _of_input(self, limit: Limit, inputs: set[str]) -> bool:
@@ -124,19 +137,19 @@ class HorizonStages:
         return [limit.name for limit in self.path] * 2
 
     @cached_property
-    def _costly(self) -> np.ndarray:
+    def costly(self) -> np.ndarray:
         """Which signals the integrand has curvature in."""
         y, *_ = self.symbols
         hessian = ca.hessian(self.at_point(self.phase.integrand), y)[0]
         return np.unique(np.concatenate([hessian.sparsity().row(), np.zeros(0, int)]).astype(int))
 
     @cached_property
-    def _point(self) -> ca.Function:
+    def point(self) -> ca.Function:
         """All that linearisation needs of one point: equations, integrand, limits, and derivatives by (x, z, u)."""
         y, t, courses = self.symbols
         cost = self.at_point(self.phase.integrand)
         hessian, gradient = ca.hessian(cost, y)
-        some = self._costly.tolist()
+        some = self.costly.tolist()
         column = ca.vertcat(ca.SX(0, 1), *(limit.expression for limit in self.path))
         rows = (
             self.at_point(column) / ca.DM([limit.size for limit in self.path]) if self.path else ca.SX(0, 1)
@@ -165,7 +178,7 @@ class HorizonStages:
         n, nx, nz, nu = len(u), self.nx, self.nz, self.nu
         y, t = self.points(w, u), times[:, None] + self.step * NODES
         found = self._at_points(y.reshape(2 * n, -1), t.ravel(), self.course_values(t.ravel()).T)
-        shapes = [self._point.size_out(k) for k in range(self._point.n_out())]
+        shapes = [self.point.size_out(k) for k in range(self.point.n_out())]
         # CasADi writes column after column
         e, J, gradient, curved, rows, R = (
             one.reshape(n, 2, columns, count).swapaxes(2, 3)
@@ -209,7 +222,7 @@ class HorizonStages:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Hessians (N, v, v) and gradients (N, v) of the costs of stages by v = (x, u), convex."""
         weights = WEIGHTS * self.step
-        some = T[:, :, self._costly]
+        some = T[:, :, self.costly]
         bent = curved @ some
         slope = np.einsum("p,npiv,npi->nv", weights, T[..., 1:], gradient[..., 0])
         slope += np.einsum("p,npiv,npi->nv", weights, some[..., 1:], bent[..., 0])
@@ -218,7 +231,7 @@ class HorizonStages:
 
     @cached_property
     def _at_points(self) -> AtPlaces:
-        return AtPlaces(self._point)
+        return AtPlaces(self.point)
 
     def moved(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
         """The unknowns of one stage (nw,) that solve its equations, from a guess; ModelError where there are none."""

@@ -42,20 +42,22 @@ class Terminal:
         old = ca.vertcat(ca.SX(0, 1), *(p.symbol for p in ends))
         new = stages.at_point(ca.vertcat(ca.SX(0, 1), *(p.expression for p in ends)))
         cost = ca.substitute(problem.objective, old, new) if ends else ca.SX(0.0)
-        self._there = not ca.SX(cost).is_constant()
+        self.there = not ca.SX(cost).is_constant()
         self.stages = stages
-        if self._there:
+        if self.there:
             hessian, gradient = ca.hessian(cost, y)
-            self._function = ca.Function("end", [y, t, courses], [ca.densify(gradient), ca.densify(hessian)])
+            self.derivatives = ca.Function(
+                "end", [y, t, courses], [ca.densify(gradient), ca.densify(hessian)]
+            )
 
     def added(self, linear: Linear, plan: "PlannedMotion") -> tuple[np.ndarray, np.ndarray]:
         """Hessians and gradients of all stages, with what the end adds to the last one."""
-        if not self._there:
+        if not self.there:
             return linear.H, linear.g
         stages = self.stages
         t = np.array([plan.t + len(plan.u) * stages.step])
         nx, nz, nu = stages.nx, stages.nz, stages.nu
-        found = self._function(stages.points(plan.w[-1:], plan.u[-1:])[0, 1], t, stages.course_values(t))
+        found = self.derivatives(stages.points(plan.w[-1:], plan.u[-1:])[0, 1], t, stages.course_values(t))
         gradient, hessian = (np.asarray(one) for one in found)
         T = np.zeros((nx + nz + nu, 1 + nx + nu))  # signals at the end by (1, x, u) of the last stage
         T[: nx + nz], T[nx + nz :, 1 + nx :] = linear.w[-1, nx + nz :], np.eye(nu)
@@ -77,14 +79,14 @@ class SteadyState:
         self._known: tuple[np.ndarray, np.ndarray] | None = None
         own = ca.vertcat(stages.problem.time, *(c.symbol for c in stages.phase.courses))
         about = ca.vertcat(stages.phase.integrand, stages.phase.ode, stages.phase.residuals)
-        self._changes = bool(ca.depends_on(about, own))
+        self.changes = bool(ca.depends_on(about, own))
 
     def at(self, t: float, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """P (nx, nx) and the state of rest (nx,), scaled, at a time in s, looked for from the model's start and from `near`.
 
         ModelError where there is none.
         """
-        if self._known is None or self._changes:
+        if self._known is None or self.changes:
             self._known = self._found(t, near)
         return self._known
 

@@ -7,10 +7,11 @@ import pytest
 
 from gantrytau import simulate
 from gantrytau.border.refusal import ModelError
-from gantrytau.kinematics import Kinematics
+from gantrytau.kinematics import Kinematics, Limits, workspace
 from gantrytau.kinematics.rotations import turned
 from gantrytau_models import FiveDofGantryTau, SixLinkGantryTau, prototypes
 from gantrytau_models.mechanisms.five_dof import CARTS
+from gantrytau_optimica import Measurements, calibrate
 
 WITH_TURNTABLES: Any = prototypes.F1
 
@@ -79,6 +80,29 @@ def test_of_the_orientation_two_angles_can_be_chosen(robot):
     assert np.isfinite(robot.ik(home.r, home.R)).all()
     with pytest.raises(ModelError, match="found 5 joints and no orientation R"):
         robot.ik(home.r)
+
+
+def test_ball_joints_limit_its_workspace_as_that_of_the_six_link_robot():
+    limits = Limits(strokes=(0.0, 2.5), ball_joint=np.radians(40))
+    six, five = (
+        workspace(make(prototypes.L1), limits, spacing=0.2) for make in (SixLinkGantryTau, FiveDofGantryTau)
+    )
+    assert "ball joint" in str(six)
+    np.testing.assert_array_equal(five.reason, six.reason)
+
+
+def test_it_is_calibrated_by_poses_of_its_plate(moved):
+    q, r, R = moved
+    measured = Measurements(q, r + 20e-6 * np.random.default_rng(1).standard_normal(r.shape), R)
+    fit = calibrate(FiveDofGantryTau(prototypes.L1), measured)
+    assert (
+        len(fit.names) == 57
+    )  # a direction for each of five carts, seven more numbers for each of six links
+    assert fit.error < 40e-6  # noise of 20 um in each of three coordinates is 32 um
+    with pytest.raises(ModelError, match=r"start='linear'.* expected 'nominal'"):
+        calibrate(FiveDofGantryTau(prototypes.L1), measured, start="linear")
+    with pytest.raises(ModelError, match=r"model=1.* its plate turns"):
+        calibrate(FiveDofGantryTau(prototypes.L1), measured, model=1)
 
 
 def test_it_falls_as_its_links_let_it():

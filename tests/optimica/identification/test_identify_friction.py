@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from gantrytau import ModelError
+from gantrytau.kinematics import Kinematics
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import MotionLog, identify_friction
 from gantrytau_optimica.identification.friction.carried_mass import carried_mass
@@ -292,3 +293,6 @@ def test_figure_has_a_panel_for_each_actuator_and_one_of_weight(tmp_path):
     figure = found.plot(file=tmp_path / "friction.png")
     assert len(figure.axes) == 4
     assert (tmp_path / "friction.png").stat().st_size > 1000
+    across = found.plot_places(Kinematics(ROBOT)).axes[0].lines[0]
+    y, z = np.unique(np.round(np.array(across.get_xydata()), 6), axis=0).T
+    assert len(y) == len(z) == 2  # one place of y and z for each pose

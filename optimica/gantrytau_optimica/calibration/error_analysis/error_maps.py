@@ -1,7 +1,7 @@
 """Where a robot errs, and in which direction: error vectors over the workspace and their principal axes.
 
 The vectors are e_k = T_k - T(q_k), measured less computed. Their principal axes are the eigenvectors of E.T E with
-the vectors as rows of E, as thesis section 5.3 does it (the printed rows are lengths, and what is called covariance is
+the vectors as rows of E, as thesis section 5.4 does it (the printed rows are lengths, and what is called covariance is
 not divided by N; the vectors are meant).
 """
 

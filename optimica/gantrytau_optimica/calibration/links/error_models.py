@@ -77,6 +77,12 @@ def check_model(model: object, robot: NominalRods, measurements: Measurements) -
         raise refused(
             f"for {robot.name} expected ", Given("model", None), ": those models have no turntables"
         )
+    if model in (1, 2) and len(robot.arms) > 3:
+        raise refused(
+            f"for {robot.name} expected ",
+            Given("model", None),
+            " or 3, as its plate turns",
+        )
     if model in (3, 4, 5) and not robot.turns:
         message = f"expected a robot with all six links, not {robot.name}; take SixLinkGantryTau, or "
         raise refused(message, Given("model", 1))

@@ -1,4 +1,4 @@
-"""Figures of friction: Dressler (2012), Figures 6.2 and 6.4."""
+"""Figures of friction: Dressler (2012), Figures 6.2 to 6.4."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -44,4 +44,19 @@ def draw_friction(
     axes[-1, 0].set_ylabel("weight [N]")
     axes[-1, 0].set_xlabel("number of the run")
     axes[-1, 0].legend(fontsize="small")
+    return finished(figure, file)
+
+
+def draw_places(r: np.ndarray, file: str | os.PathLike[str] | None) -> "Figure":
+    """Places r (R, 3) of the tool, across the guideways and along them."""
+    import matplotlib.pyplot as plt
+
+    if file is not None:
+        check_suffix(file)
+    figure, panels = plt.subplots(1, 2, figsize=(8.0, 3.6), layout="constrained")
+    for axis, (i, j) in zip(panels, ((1, 2), (0, 2)), strict=True):
+        axis.plot(r[:, i], r[:, j], "x")
+        axis.set(xlabel=f"{'xyz'[i]} [m]", ylabel=f"{'xyz'[j]} [m]")
+        axis.margins(0.2)
+        axis.grid(alpha=0.3)
     return finished(figure, file)

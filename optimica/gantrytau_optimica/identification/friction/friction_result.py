@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gantrytau.describing.record import Record
+from gantrytau.kinematics import Kinematics
 from gantrytau_optimica.fitting.covariance import named_covariance
 from gantrytau_optimica.fitting.diagnostics import Diagnostics
 from gantrytau_optimica.fitting.finding import Finding
 from gantrytau_optimica.identification.friction.carried_mass import CarriedMass
 from gantrytau_optimica.identification.friction.constant_runs import ConstantRuns
-from gantrytau_optimica.identification.friction.figures import draw_friction
+from gantrytau_optimica.identification.friction.figures import draw_friction, draw_places
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,6 +69,10 @@ class Friction(Record):
     def plot(self, *, file: str | os.PathLike[str] | None = None) -> "Figure":
         """Forces less weight over speed for each actuator, with the law, and the weight of each run: Figures 6.2 and 6.4."""
         return draw_friction(self.load.actuators, self.runs, self.mass, self.force, file)
+
+    def plot_places(self, kinematics: Kinematics, *, file: str | os.PathLike[str] | None = None) -> "Figure":
+        """Where the tool is in the middle of each run, by kinematics of the robot: Figure 6.3."""
+        return draw_places(kinematics.fk(self.runs.q)[0], file)
 
     def __repr__(self) -> str:
         deviation = self.deviations

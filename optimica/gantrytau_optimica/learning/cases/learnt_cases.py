@@ -28,9 +28,13 @@ SETTLED = 5  # runs, after which errors are averaged in Table 7.2
 
 @dataclass(frozen=True)
 class LearntCases(Record):
-    """Histories by the names of cases. As a text: sigma, and errors of the tool in % of the first run."""
+    """Histories by the names of cases. As a text: sigma, and errors of the tool in % of the first run.
+
+    fitted: what numbers of the robot are fitted to printed results, as its record says.
+    """
 
     histories: dict[str, History] = field(default_factory=dict)
+    fitted: str = ""
 
     def settled(self, name: str) -> np.ndarray:
         """Errors of the tool, (3,) in % of the first run, in the mean from run 5 on, or of the last."""
@@ -47,7 +51,7 @@ class LearntCases(Record):
         few = any(len(history) <= SETTLED for history in self.histories.values())
         when = "of the last run" if few else f"in the mean from run {SETTLED} on"
         lines.append(f"Errors of the tool in % of the first run, {when}")
-        return "\n".join(lines)
+        return "\n".join([*lines, self.fitted]).strip()
 
 
 def learn_cases(
@@ -72,7 +76,7 @@ def learn_cases(
             if isinstance(error.__cause__, KeyboardInterrupt):
                 raise
             raise error.within(f"{rig.file}: case {case.name}") from error
-    return LearntCases(found)
+    return LearntCases(found, rig.fitted)
 
 
 def _learnt(

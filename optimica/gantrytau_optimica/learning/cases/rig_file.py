@@ -157,6 +157,11 @@ class RigFile(Record):
             cases=tuple(case for case in self.cases if not names or case.name in names),
         )
 
+    @property
+    def fitted(self) -> str:
+        """What numbers of the robot are fitted to printed results, as its record says."""
+        return record_of(f"{self.file}: rig", self.table["record"]).fitted if "record" in self.table else ""
+
     def plant(self) -> Plant:
         """The robot under its servos. Raises ModelError, with the place in the file, where there is none."""
         place = f"{self.file}: rig"

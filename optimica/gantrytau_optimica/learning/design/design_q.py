@@ -32,6 +32,7 @@ CLOSED, NEAR = 0.15, 0.08  # |Q| around a named resonance at most, and how far t
 def design_q(
     responses: OverFrequencies | Sequence[OverFrequencies],
     *,
+    tool: OverFrequencies | Sequence[OverFrequencies] | None = None,
     limit: float = 30.0,
     margin: float = 0.95,
     notches: int = 2,
@@ -42,9 +43,11 @@ def design_q(
     """The zero-phase filters, one for each axis, that are most open up to `limit` Hz and keep sigma within the margin.
 
     responses: from corrections to what is learnt from, sampled systems or what `estimated_response` found, or anything with
-    `response(hz)` (m, m, K) and `period`; a system alone stands for `uncertain(response)`. learning: gain and shift, by
-    default those of `Learning()`; at: Hz of resonances around which |q| <= 0.15 within 8 % in any case, for each
-    axis one, several or None; samples: of the window in which the worst of the family is checked over a whole run.
+    `response(hz)` (m, m, K) and `period`; a system alone stands for `uncertain(response)`. tool: responses of the tool
+    alike, where the others are of an estimate, which shows nothing of what its model does not know: Q then suits both.
+    learning: gain and shift, by default those of `Learning()`; at: Hz of resonances around which |q| <= 0.15 within 8 % in
+    any case, for each axis one, several or None; samples: of the window in which the worst of the family is checked
+    over a whole run.
     Raises ModelError for responses of different periods or axes, for a law that goes by a model, and where no filter holds.
     """
     limit = number("design_q", "limit", limit, above=0.0)
@@ -52,6 +55,8 @@ def design_q(
     whole("design_q", "notches", notches, least=0, most=6)
     whole("design_q", "samples", samples, least=1)
     family, law = members_of(responses, learning)
+    if tool is not None:
+        family, law = members_of((*family, *members_of(tool, learning)[0]), learning)
     period = float(family[0].period or 0.0)
     limit = number("design_q", "limit", limit, below=0.5 / period)
     hz = frequencies(family)

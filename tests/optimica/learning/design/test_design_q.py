@@ -103,6 +103,14 @@ def test_more_notches_and_wider_margins_leave_filters_more_open():
     assert tight < opened[2]
 
 
+def test_a_filter_for_an_estimate_that_misses_a_swing_suits_the_tool_too():
+    estimate, hz = one(hz=60.0, damping=0.9), np.linspace(7.5, 8.5, 50)  # stiff: no swing at 8 Hz
+    assert sigma(design_q(estimate), one(), hz).max() > 1.2
+    q = design_q(estimate, tool=one())
+    for system in (estimate, *uncertain(one())):
+        assert sigma(q, system, np.linspace(0.1, 120, 2000)).max() < 0.96
+
+
 def test_families_move_resonances_and_keep_the_static_gain():
     system = coupled(0.3)
     family = uncertain(system, frequencies=(0.9, 1.1), damping=(0.5, 2.0))

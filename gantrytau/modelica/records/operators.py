@@ -7,8 +7,9 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import tree
+from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
-from gantrytau.modelica.elaboration.values import RecordValue
+from gantrytau.modelica.records.record_values import RecordValue
 
 Call = Callable[[ClassScope, Sequence[Any], Mapping[str, Any]], Any]
 
@@ -27,6 +28,13 @@ def _plain(scope: ClassScope) -> ClassScope | None:
     while isinstance(scope.definition.body, tree.ShortClass):
         scope = scope.bases[0][0]
     return scope if "operator" in scope.definition.prefixes else None
+
+
+def operated(sign: str, operands: Sequence[Any], call: Call) -> Any:
+    """The value of an operator on one or two operands."""
+    if any(operator_record(one) is not None for one in operands):
+        return overloaded(sign, operands, call)
+    return values.unary(sign, *operands) if len(operands) == 1 else values.binary(sign, *operands)
 
 
 def overloaded(sign: str, operands: Sequence[Any], call: Call) -> Any:

@@ -1,1 +1,0 @@
-"""What operator records define."""

@@ -1,0 +1,1 @@
+"""Records: their values, the operators that they define, and what assignments change in them."""

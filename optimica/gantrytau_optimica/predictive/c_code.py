@@ -1,0 +1,159 @@
+"""A predictive controller as C: `controller.h` and `controller.c` of its numbers, its stage function and a template."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from gantrytau import ModelError
+from gantrytau.answers.c_code import c_source
+from gantrytau.answers.sampled_code import SampledCode
+from gantrytau_optimica.predictive.horizon_qp import RIDGE
+from gantrytau_optimica.predictive.plan import PlannedMotion
+from gantrytau_optimica.predictive.stages import HorizonStages
+from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
+
+TEMPLATES = Path(__file__).parent
+TURNS = 60  # of the interior-point method, at most; 10 to 25 are usual
+CLOSE, GOOD = 1e-14, 1e-9  # of products of slacks and multipliers: where it ends, and what is a solution
+KEPT = 1e-11  # of limits, in sizes
+YIELD = (
+    1e-10  # of limits by their multipliers: of 1e-9 to 1e-13 the nearest to PIQP on ill-conditioned programs
+)
+
+
+def controller_code(
+    mpc: Any, soft: np.ndarray, penalty: float, first: PlannedMotion, limits: tuple[int, int, float]
+) -> SampledCode:
+    """C of an Mpc. soft (rows,): which limits give way; first: plan, NaN for measured states; limits: most iterations of the
+    first plan and of a step, and changes by which they are done.
+
+    ModelError for courses, which are functions of Python, and for a steady state that moves.
+    """
+    stages: HorizonStages = mpc.stages
+    if stages.phase.courses:
+        names = ", ".join(course.name for course in stages.phase.courses)
+        raise ModelError(
+            f"{names}: a course is a function of Python, expected formulas of time for C; write it into the model",
+            place=mpc.name,
+        )
+    rows = _rows(mpc, soft)
+    sizes = dict(
+        PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size,
+        NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.any()),
+        END=int(mpc.terminal.there), DELAY=mpc.delay, PENALTY=float(penalty), RIDGE=RIDGE,
+        TURNS=TURNS, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
+        FIRST=limits[0], ITERATIONS=limits[1], STANDS=limits[2],
+    )  # fmt: skip
+    point = stage_point(stages, mpc.terminal)
+    sizes["WORK"] = int(point.sz_w())
+    told = {
+        "@NAME@": mpc.name,
+        "@PERIOD@": repr(mpc.period),
+        "@PERIODS@": f"{mpc.elements} periods",
+        "@FIRST@": str(limits[0]),
+        "@ITERATIONS@": "one" if limits[1] == 1 else f"up to {limits[1]}",
+        "@GIVEN@": str(stages.nx),
+        "@FOUND@": str(stages.nu),
+        "@GIVEN_NAMES@": ", ".join(mpc.states),
+        "@FOUND_NAMES@": ", ".join(mpc.inputs),
+        "@SIZES@": "\n".join(f"#define MPC_{name} {value!r}" for name, value in sizes.items()),
+        "@POINT@": c_source(point, name="mpc_point").rstrip("\n"),
+        "@TABLES@": "\n".join(_tables(mpc, rows, first)),
+    }
+    texts = []
+    for name in ("controller.h", "controller.c"):
+        text = (TEMPLATES / name).read_text(encoding="utf-8")
+        for word, value in told.items():
+            text = text.replace(word, value)
+        texts.append(text)
+    flat = mpc.built.read.dae.flat
+    units = {n: v.unit for v in flat.variables for n in v.elements if v.unit}
+    own = {n: units[n] for n in (*mpc.states, *mpc.inputs) if n in units}
+    return SampledCode(
+        given=mpc.states, find=mpc.inputs, period=mpc.period, units=own, header=texts[0], source=texts[1]
+    )
+
+
+def stage_point(stages: HorizonStages, terminal: Terminal) -> ca.Function:
+    """All that linearisation needs of one point, and, where the end costs something, its gradient and Hessian there."""
+    y, t, courses = stages.symbols
+    found = stages.point(y, t, courses)
+    if terminal.there:
+        found = [*found, *terminal.derivatives(y, t, courses)]
+    return ca.Function("mpc_point", [y, t], [ca.densify(one) for one in found], {"cse": True})
+
+
+def _rows(mpc: Any, soft: np.ndarray) -> list[str]:
+    """Limits of a stage of the program, each with one end."""
+    stages, moves, found = mpc.stages, mpc.moves, []
+    paths = len(stages.path)
+    for k, ends in enumerate(zip(*stages.rows, strict=True)):
+        found += _ends("MPC_PATH", k // paths, k % paths, ends, bool(soft[k]))
+    for k, ends in enumerate(zip(stages.lower_u, stages.upper_u, strict=True)):
+        found += _ends("MPC_INPUT", 0, k, ends, False)
+    for k in moves.limited:
+        found += _ends("MPC_MOVE", 0, k, (moves.lower[k], moves.upper[k]), False)
+    return [*found, *(["{MPC_SLACKNESS, 0, 0, -1, 0, 0.0}"] if soft.any() else [])]
+
+
+def _ends(kind: str, point: int, index: int, ends: tuple[float, float], soft: bool) -> list[str]:
+    return [
+        f"{{{kind}, {point}, {index}, {sign}, {int(soft)}, {float(end)!r}}}"
+        for sign, end in zip((-1, 1), ends, strict=True)
+        if np.isfinite(end)
+    ]
+
+
+def _tables(mpc: Any, rows: list[str], first: PlannedMotion) -> Iterable[str]:
+    stages: HorizonStages = mpc.stages
+    signals = stages.nx + stages.nz + stages.nu
+    P, rest = _rest(mpc.steady, stages)
+    moves = mpc.moves
+    yield f"static const mpc_row mpc_rows[] = {{{', '.join(rows) or '{MPC_PATH, 0, 0, 1, 0, 0.0}'}}};"
+    yield _integers("mpc_every", range(signals))
+    yield _integers("mpc_costly", stages.costly)
+    yield _integers("mpc_chosen", moves.chosen)
+    yield _numbers("mpc_weights", moves.weights)
+    yield _numbers("mpc_lower_move", moves.lower)
+    yield _numbers("mpc_upper_move", moves.upper)
+    yield _numbers("mpc_lower_u", stages.lower_u)
+    yield _numbers("mpc_upper_u", stages.upper_u)
+    yield _numbers("mpc_sizes_x", stages.sizes_x)
+    yield _numbers("mpc_sizes_u", stages.sizes_u)
+    yield _numbers("mpc_rest_x", rest)
+    yield _numbers("mpc_rest_P", P, "[NX]")
+    yield _numbers("mpc_first_x", first.x, "[NX]")
+    yield _numbers("mpc_first_w", first.w, "[NW]")
+    yield _numbers("mpc_first_u", first.u, "[NU]")
+
+
+def _rest(steady: SteadyState | None, stages: HorizonStages) -> tuple[np.ndarray, np.ndarray]:
+    """What it costs to be away from the state of rest, and that state; ModelError where it moves with time."""
+    if steady is None:
+        return np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
+    if steady.changes:
+        raise ModelError(
+            "terminal='lqr' and a state of rest that moves with time, expected one that stays for C; give the end a cost by "
+            "objective() instead",
+            place=stages.problem.name,
+        )
+    start = np.array([s.guess(np.zeros(1))[0] for s in stages.phase.states]) / stages.sizes_x
+    return steady.at(0.0, start)
+
+
+def _numbers(name: str, values: np.ndarray, columns: str = "") -> str:
+    """A table row by row, with NAN for what is not known."""
+    words = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+
+    def row(numbers: np.ndarray) -> str:
+        return "{" + ", ".join(words.get(repr(float(v)), repr(float(v))) for v in numbers) + "}"
+
+    inside = row(values) if not columns else "{" + ", ".join(row(one) for one in values) + "}"
+    return f"static const double {name}[]{columns} = {inside};"
+
+
+def _integers(name: str, values: Iterable[int]) -> str:
+    return f"static const int {name}[] = {{{', '.join(str(int(v)) for v in values) or '0'}}};"

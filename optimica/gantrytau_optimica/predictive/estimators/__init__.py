@@ -1,0 +1,1 @@
+"""States, slow parameters and disturbances of a model from noisy samples."""

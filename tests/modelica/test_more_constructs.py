@@ -1,0 +1,228 @@
+"""Arrays of components with two dimensions; classes that extend those of their names, and constants of packages."""
+
+import numpy as np
+import pytest
+
+from gantrytau import ModelError, SolveError, load_modelica, simulate, translate
+
+GRID = """package Grids
+  connector Pin
+    Real v;
+    flow Real i;
+  end Pin;
+  model Resistor
+    Pin p, n;
+    parameter Real R = 1;
+    parameter Integer count = 1;
+    Real w[count] = {k * p.i for k in 1:count};
+  equation
+    p.v - n.v = R * p.i;
+    p.i + n.i = 0;
+  end Resistor;
+  model Source
+    Pin p;
+    parameter Real V = 0;
+  equation
+    p.v = V;
+  end Source;
+  model Grid
+    Resistor b[2, 3](R = {{1, 2, 3}, {4, 5, 6}}, each count = 2), d[2, 2](R = fill(2, 2, 2), count = [1, 2; 3, 4]);
+    Source left[2](V = {12, 30}), right;
+    Real total = sum(b.p.i), column[2] = b[:, 2].p.i, last = b[end, end].w[2];
+    parameter Integer sizes[2] = size(b);
+  equation
+    for i in 1:2 loop
+      connect(left[i].p, b[i, 1].p);
+      for j in 1:2 loop
+        connect(b[i, j].n, b[i, j + 1].p);
+      end for;
+      connect(b[i, 3].n, right.p);
+      connect(left[1].p, d[1, i].p);
+      connect(d[2, i].n, right.p);
+    end for;
+    connect(d[1, :].n, d[2, :].p);
+  end Grid;
+  model Two
+    Grid one(b(R = {{1, 1, 1}, {1, 1, 3}}), d(each R = 1));
+  end Two;
+end Grids;
+"""
+
+
+def test_components_in_rows_and_columns(tmp_path):
+    (tmp_path / "grids.mo").write_text(GRID)
+    library = load_modelica(tmp_path / "grids.mo")
+    result = simulate(library["Grids.Grid"](), stop=1.0)
+    found = {n: result.final(n) for n in ("total", "column[2]", "last", "sizes[2]", "d[2,2].w[4]")}
+    assert found == {"total": 12, "column[2]": 2, "last": 4, "sizes[2]": 3, "d[2,2].w[4]": 12}
+    assert simulate(library["Grids.Grid"](), stop=1.0, parameters={"b[2,3].R": 21}).final("last") == 2
+    result = simulate(library["Grids.Two"](), stop=1.0)
+    assert [result.final(f"one.{n}.p.i") for n in ("b[1,2]", "b[2,2]", "d[1,2]")] == [4, 6, 6]
+
+
+EXTENDED = """package Media
+  partial package Base
+    constant Real k = 2;
+    replaceable model Balance
+      parameter Real gain = 1;
+      Real x(start = 1, fixed = true), y;
+    equation
+      der(x) = -gain * x;
+    end Balance;
+    replaceable partial function law
+      input Real u;
+      output Real v;
+    end law;
+    model Use
+      Balance b;
+      Real v = law(b.x);
+    end Use;
+  end Base;
+  package Middle
+    extends Base;
+    redeclare replaceable model extends Balance(gain = k)
+    equation
+      y = x + shift;
+    protected
+      parameter Real shift = 10;
+    end Balance;
+    redeclare function extends law
+    algorithm
+      v := 3 * u;
+    end law;
+  end Middle;
+  package Last
+    extends Middle(k = 3);
+    redeclare model extends Balance
+      Real z = 2 * y;
+    end Balance;
+  end Last;
+  model Chosen
+    replaceable package Medium = Last;
+    Real twice = 2 * Medium.law(Medium.k);
+  end Chosen;
+  model Inherited
+    extends Base;
+    model extends Other
+    end Other;
+    Other o;
+  end Inherited;
+end Media;
+"""
+
+
+def test_a_class_extends_the_one_of_its_name_and_has_the_constants_of_the_heir(tmp_path):
+    (tmp_path / "media.mo").write_text(EXTENDED)
+    library = load_modelica(tmp_path / "media.mo")
+    for package, k, doubled in (("Middle", 2, 0), ("Last", 3, 1)):
+        result = simulate(library[f"Media.{package}.Use"](), stop=1.0)
+        assert result.final("v") == pytest.approx(3 * np.exp(-k), rel=1e-6)
+        y = np.exp(-k) + 10
+        assert result.final("b.z" if doubled else "b.y") == pytest.approx((1 + doubled) * y, rel=1e-6)
+    assert simulate(library["Media.Chosen"](), stop=1.0).final("twice") == 18
+    with pytest.raises(ModelError, match="'Other' behind 'extends', expected an inherited class"):
+        library["Media.Inherited"]
+
+
+INSTANTS = """package Instants
+  record Losses
+    parameter Real P = 1;
+    final parameter Real linear = 0.1 * P;
+  end Losses;
+  model Machine
+    parameter Losses losses;
+    Real heat = losses.linear + losses.P;
+  end Machine;
+  model Held "y holds what was chosen last, without min and max"
+    parameter Losses losses(P = 4);
+    Machine machine(losses = losses);
+    Boolean u[2] = {time > 1 and time < 2, time > 3 and time < 4};
+    Integer y, n(start = 0), risen(start = 0), any(start = 0);
+  initial equation
+    pre(y) = 7;
+  equation
+    y = if u[1] then 20 elseif u[2] then -300 else pre(y);
+    when change(u[1]) then
+      n = pre(n) + 1;
+    end when;
+    when edge(u[2]) then
+      risen = pre(risen) + 1;
+    end when;
+    when u then
+      any = pre(any) + 1;
+    end when;
+  end Held;
+  function after "the row behind x"
+    input Real rows[:];
+    input Real x;
+    input Integer first;
+    output Integer next;
+  protected
+    Integer n = size(rows, 1);
+  algorithm
+    next := first;
+    while next < n and x >= rows[next] loop
+      next := next + 1;
+    end while;
+  end after;
+  model Buffer
+    Integer k(start = 0), row(start = 1);
+    Real buffer[4](each start = 0, each fixed = true), table[2, 2];
+    parameter Integer shift = 0;
+    Integer place(start = 1);
+  algorithm
+    when sample(0.5, 1) then
+      k := pre(k) + 1;
+      buffer[k + shift] := 10 * k;
+      row := after({0.1, 1.1, 2.9, 9}, time, pre(row));
+    end when;
+    place := if time > 1 then 2 else 1;
+    table := {{1, 2}, {3, 4}};
+    table[place, :] := {time, 5};
+  end Buffer;
+  model Sampled
+    Integer n(start = 0), m(start = 0);
+    Real last(start = -1);
+  equation
+    when sample(-0.3, 1) then
+      n = pre(n) + 1;
+      last = time;
+    end when;
+    when sample(2, 0.5) then
+      m = pre(m) + 1;
+    end when;
+  end Sampled;
+end Instants;
+"""
+
+
+@pytest.fixture
+def instants(tmp_path):
+    (tmp_path / "instants.mo").write_text(INSTANTS)
+    return load_modelica(tmp_path / "instants.mo")
+
+
+def test_an_integer_without_limits_is_held_and_elements_change(instants):
+    result = simulate(instants["Instants.Held"](), stop=5.0)
+    assert [float(result.at(t, "y")) for t in (0.5, 1.5, 2.5, 3.5, 4.5)] == [7, 20, 20, -300, -300]
+    assert [result.final(name) for name in ("n", "risen", "any")] == [2, 1, 2]
+    assert result.final("machine.heat") == pytest.approx(4.4)  # 0.1 * 4 + 4: what is final stays
+
+
+def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(instants):
+    result = simulate(instants["Instants.Buffer"](), stop=3.0)
+    assert [result.final(f"buffer[{k}]") for k in (1, 2, 3, 4)] == [10, 20, 30, 0]
+    assert [float(result.at(t, "row")) for t in (0.7, 1.7, 2.7)] == [2, 3, 3]
+    assert [float(result.at(0.5, name)) for name in ("table[1,1]", "table[2,2]")] == [0.5, 4]
+    assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
+    with pytest.raises(SolveError):
+        simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants):
+    found = [simulate(instants["Instants.Sampled"](), start=t, stop=t + 1.5) for t in (0.0, 0.7, 2.1)]
+    assert [(one.final("n"), round(one.final("last"), 9), one.final("m")) for one in found] == [
+        (1, 0.7, 0), (2, 1.7, 1), (1, 2.7, 3),
+    ]  # fmt: skip
+    text = translate(instants["Instants.Sampled"](), events=True).equations("base-modelica")
+    assert all(words in text for words in ("sample(-0.3, 1)", "sample(2, 0.5)"))
