@@ -187,9 +187,7 @@ class Real(Quantity):
     undetermined: the likely cause where the equations do not determine it, for messages.
     """
 
-    inlined = (
-        False  # whether an equation that has it alone on a side says what it is, as of a propagated quantity
-    )
+    inlined = False  # whether it is an expression where an equation has it alone on a side
 
 
 class Input(Quantity):
