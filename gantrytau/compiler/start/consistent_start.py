@@ -65,14 +65,13 @@ def _consistent_start(
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free), last.exact)
     title, fixed = flat.name, guess.fixed | held
-    started, thorough = guess.started | held, not held
+    started = guess.started | held
     initial = bool(flat.initial_equations) and not held
     if initial and free not in indexed.with_initial:
         indexed.with_initial[free] = _initial_level(flat, reduced, stages)
 
-    def led(levels: list[Level], thorough: bool = False) -> dict[str, float]:
+    def led(levels: list[Level], chosen: frozenset[str], thorough: bool = False) -> dict[str, float]:
         """Solve the levels, and then all of them with the initial equations."""
-        chosen = guess.chosen if thorough else frozenset[str]()
         values = solve_levels(
             levels,
             guess.values,
@@ -86,7 +85,7 @@ def _consistent_start(
         return solve_levels(whole, values, held=fixed, started=guess.started, title=title)
 
     try:
-        return led(stages, thorough)
+        return led(stages, guess.chosen, not held)
     except InitializationError as error:
         refuse_outside(flat, reduced, guess.values, error)
         if held or not (guess.fixed or initial):
@@ -94,8 +93,8 @@ def _consistent_start(
         # a fixed start may belong to a later level than the states that follow it, an initial equation to the first
         for levels in ([indexed.whole], _with_initial(flat, reduced, stages) if initial else []):
             with contextlib.suppress(InitializationError):
-                return led(levels)
-        raise _with_nearest(error, stages, guess, started, title) from None
+                return led(levels, frozenset())
+        raise (_with_nearest(error, stages, guess, started, title) if guess.fixed else error) from None
 
 
 def _with_nearest(
