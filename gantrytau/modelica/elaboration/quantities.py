@@ -24,7 +24,7 @@ from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
-from gantrytau.modelica.overdetermined.records import is_propagated, propagated_quantity
+from gantrytau.modelica.overdetermined.records import is_overdetermined, is_propagated, propagated_quantity
 from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
@@ -79,6 +79,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     elif kind is Input and inside_optimization(structure):
         kind = Real  # which the equations around it determine
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
+    found.inlined = kind is Real and is_overdetermined(structure)  # type: ignore[attr-defined]
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
     body[name] = found

@@ -12,6 +12,7 @@ from gantrytau.language.declarations import Discrete
 from gantrytau.language.events import Happening, WhenChain, reinit, terminate
 from gantrytau.language.functions import if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
+from gantrytau.language.symbols import of_parameters
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
     BEFORE,
@@ -273,7 +274,8 @@ def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> I
     if where is not True:
         holds = values.binary("or", values.unary("not", where), values.condition(holds))
     if isinstance(holds, ca.SX):
-        if where is True and reader.members.is_fixed(arguments["condition"]):
+        words = words or "an assertion does not hold"
+        if where is True and of_parameters(holds):
             yield require(holds, words)
         else:
             yield WhenChain((Happening(logic_not(values.condition(holds)), (), words, True, words),))
