@@ -360,3 +360,13 @@ def test_a_fixed_start_of_a_boolean_is_its_value_before_the_start(tmp_path):
     )
     found = simulate(load_modelica(tmp_path / "b.mo")["B"](), stop=2.0)
     assert (found["b"][0], found.final("b"), found.final("x")) == (0, 1, pytest.approx(1.0, abs=1e-6))
+
+
+def test_what_remembers_sees_a_pulse_of_one_round_beside_a_when(tmp_path):
+    (tmp_path / "p.mo").write_text(
+        "model P Boolean up, pulse, y; Integer n(start=0); initial equation pre(y) = false;"
+        " equation up = time > 1; pulse = edge(up); y = pulse or pre(y);"
+        " when time > 1 then n = pre(n) + 1; end when; end P;"
+    )
+    found = simulate(load_modelica(tmp_path / "p.mo")["P"](), stop=2.0)
+    assert [found["y"][0], found.final("y"), found.final("n")] == [0, 1, 1]
