@@ -2,7 +2,7 @@
 
 import pytest
 
-from gantrytau import ModelError, load_modelica, simulate, translate
+from gantrytau import load_modelica, simulate
 
 TEXT = """package Lines
   connector Pin
@@ -70,12 +70,6 @@ TEXT = """package Lines
     connect(source.axis, bus.one);
     connect(other.one, reader.axis);
   end Machine;
-  model Undeclared
-    Bus bus;
-    Source source;
-  equation
-    connect(source.axis, bus.three);
-  end Undeclared;
   model Steps
     Integer n;
     Real x(start = 0, fixed = true), counted(start = 0, fixed = true);
@@ -151,12 +145,6 @@ def test_signals_of_a_bus_that_no_component_uses_are_left_out(tmp_path):
     assert "other.one.angle" in result
     assert "other.one.current" not in result
     assert "bus.two.angle" not in result
-
-
-def test_a_member_that_an_expandable_connector_does_not_declare_is_named(tmp_path):
-    (tmp_path / "lines.mo").write_text(TEXT)
-    with pytest.raises(ModelError, match=r"'three' of an expandable connector, .* declare it in Lines\.Bus"):
-        translate(load_modelica(tmp_path / "lines.mo")["Lines.Undeclared"]())
 
 
 STAGES = """package Stages

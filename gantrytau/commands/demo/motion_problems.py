@@ -1,7 +1,7 @@
 """The minimum-time motions of thesis Table 3.1, and one of the robot with six links, as problems."""
 
 from gantrytau import Input, Parameter, Real, between
-from gantrytau.mechanics.translational import LinearFriction, TanhFriction
+from gantrytau.mechanics import LinearFriction, TanhFriction
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial
 

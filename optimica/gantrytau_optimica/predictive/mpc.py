@@ -14,15 +14,10 @@ from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
+from gantrytau_optimica.predictive import horizon_checks as checks
 from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
-from gantrytau_optimica.predictive.horizon_checks import (
-    check_bounded,
-    check_plan,
-    doubt_deadline,
-    doubt_samples,
-)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
@@ -100,8 +95,8 @@ class Mpc:
         self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
         self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
-        check_bounded(self.stages)
-        doubt_samples(self.built, self.period)
+        checks.check_bounded(self.stages)
+        checks.doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self.stages.curvature if penalty is None else penalty
         finite = np.isfinite(self.stages.rows)
@@ -185,7 +180,7 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
-        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
+        checks.doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
@@ -218,7 +213,7 @@ class Mpc:
                 return plan, False, change
             found = self._solved(plan, x)
             if first and found.unbounded:
-                check_plan(self.stages, plan, True)
+                checks.check_plan(self.stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
@@ -226,7 +221,7 @@ class Mpc:
             if change < STANDS:
                 break
         if first:
-            check_plan(self.stages, plan, False)
+            checks.check_plan(self.stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
