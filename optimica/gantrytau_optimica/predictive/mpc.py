@@ -56,11 +56,9 @@ class Mpc:
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
     disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
-    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
-    objective is least at the set point (Pannocchia, Rawlings, 2003).
-    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
-    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
-    or [1, 1, 2, 4], the last one to the end.
+    `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
+    disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
+    2003).
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
@@ -98,6 +96,7 @@ class Mpc:
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         check_bounded(self.stages)
         doubt_samples(self.built, self.period)
@@ -223,8 +222,9 @@ class Mpc:
         return self.stages.linear(plan.x[:-1], plan.w, plan.u, times)
 
     def reset(self) -> None:
-        """Forget the plan: the next step makes a first one."""
+        """Forget the plan and the estimates: the next step makes a first one."""
         self._plan = self._prepared = None
+        self._estimates |= self._modelled
         self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def run(
@@ -258,11 +258,13 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
+        foretold, or kept, likewise.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
-        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+        limits = MOST, self.iterations, STANDS
+        return controller_code(self, self._yielding, self._penalty, unknown, limits, self._estimates)
 
     @property
     def held(self) -> dict[str, float]:
