@@ -11,9 +11,9 @@ from gantrytau.flattening.instantiation import Instance
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.language.declarations import Quantity
 from gantrytau.language.model import Connector
-from gantrytau.language.scalar_arithmetic import leaf_names, negative, plus
+from gantrytau.language.scalar_arithmetic import negative, plus
 from gantrytau.language.statements import Connection, Equation, equality
-from gantrytau.language.symbols import scalars, split_derivative
+from gantrytau.language.symbols import scalars
 
 # a connector seen from outside its component has sign +1, from inside -1: what flows in there leaves here
 Face = tuple[str, int]
@@ -64,35 +64,6 @@ def connection_equations(
     for key, faces in sets.items():
         equations += _set_equations([(members[path], path, sign) for path, sign in faces], into.get(key, []))
     return equations
-
-
-def without_unused(instance: Instance, equations: list[Equation]) -> tuple[list[Equation], dict[str, str]]:
-    """The equations without those of potentials of expandable connectors that are connected to such ones only.
-
-    Beside them the names of these potentials, and why they are absent.
-    """
-    buses = [one for _, one, _ in instance.connectors if one.expandable]
-    members = [
-        (one, name) for one in buses for name, m in type(one).members().items() if isinstance(m, Quantity)
-    ]
-    names = dict.fromkeys(s.name() for one, name in members for s in scalars(getattr(one, name)))
-    if not names:
-        return equations, {}
-    found = [[split_derivative(n)[0] for n in leaf_names([e.residual])] for e in equations]
-    joined = [
-        e.model == "connection" and names.keys() >= {*leaves}
-        for e, leaves in zip(equations, found, strict=True)
-    ]
-    used = {n for leaves, both in zip(found, joined, strict=True) if not both for n in leaves if n in names}
-    pairs = [leaves for leaves, both in zip(found, joined, strict=True) if both]
-    while more := {n for leaves in pairs if not used.isdisjoint(leaves) for n in leaves} - used:
-        used |= more
-    kept = (
-        e for e, leaves, both in zip(equations, found, joined, strict=True) if not both or leaves[0] in used
-    )
-    return list(kept), {
-        n: "no component is connected to this signal of a bus" for n in names if n not in used
-    }
 
 
 def _nested(connection: Connection) -> Iterable[Connection]:

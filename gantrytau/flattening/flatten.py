@@ -9,7 +9,7 @@ import casadi as ca
 
 from gantrytau.border.refusal import told
 from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
-from gantrytau.flattening.connections import connection_equations, without_unused
+from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_checks import (
     refuse_absent,
     refuse_before,
@@ -135,7 +135,6 @@ def write_out(instance: Instance) -> FlatModel:
         closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
         equations += connection_equations(instance, joined, closures)
         equations += [e for closure in closures for e in closure.equations]
-        equations, unused = without_unused(instance, equations)
         spread = Spread(instance, tree, passed_on)
         written, written_initial = spread.substituted(equations), spread.substituted(stated.initial)
         events, sampled, frictions, whens, right = _events(stated, instance, spread)
@@ -145,7 +144,7 @@ def write_out(instance: Instance) -> FlatModel:
         refuse_tables(everything)
         refuse_nan(everything)
         spread.refuse_undefined(everything, names)
-        absent = _absent([way for *_, way in stated.ways], tree) | unused
+        absent = _absent([way for *_, way in stated.ways], tree)
         refuse_absent(everything, names, absent)
         refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]

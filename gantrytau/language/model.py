@@ -140,12 +140,7 @@ class Declared(_Part):
 
 
 class Connector(Declared):
-    """A set of potentials (`Real`) and flows (`Flow`) through which components are connected.
-
-    expandable: whether a potential that no component reads or sets is left out of the model.
-    """
-
-    expandable: ClassVar[bool] = False
+    """A set of potentials (`Real`) and flows (`Flow`) through which components are connected."""
 
     def closing(self, other: Any) -> Iterator[tuple[str, str, Any, Any, Any]]:
         """What makes this connector coincide with another one where a loop of propagated quantities closes.

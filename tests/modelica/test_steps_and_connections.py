@@ -1,7 +1,5 @@
 """`cardinality` on both sides of a component; steps as graphs of states have them: conditions and values at the start."""
 
-import pytest
-
 from gantrytau import load_modelica, simulate
 
 TEXT = """package Lines
@@ -39,37 +37,6 @@ TEXT = """package Lines
       connect(a[3].r, g.q);
     end if;
   end Whole;
-  expandable connector Axis
-    Real angle, current, unused;
-  end Axis;
-  expandable connector Bus
-    Axis one, two;
-  end Bus;
-  model Source
-    output Real y = time;
-    Axis axis;
-  equation
-    connect(y, axis.angle);
-  end Source;
-  model Twice
-    input Real u;
-    Real y = 2 * u;
-  end Twice;
-  model Reader
-    Twice twice;
-    Axis axis;
-  equation
-    connect(axis.angle, twice.u);
-  end Reader;
-  model Machine
-    Bus bus, other;
-    Source source;
-    Reader reader;
-  equation
-    connect(bus, other);
-    connect(source.axis, bus.one);
-    connect(other.one, reader.axis);
-  end Machine;
   model Steps
     Integer n;
     Real x(start = 0, fixed = true), counted(start = 0, fixed = true);
@@ -136,15 +103,6 @@ def test_an_initial_value_reaches_what_it_equals_before_the_start(tmp_path):
     result = simulate(load_modelica(tmp_path / "steps.mo")["Grafcet.Whole"](), stop=2.0)
     states = [[float(result.at(t, f"{name}.active")) for t in (0.5, 1.5)] for name in "ab"]
     assert states == [[1, 0], [0, 1]]
-
-
-def test_signals_of_a_bus_that_no_component_uses_are_left_out(tmp_path):
-    (tmp_path / "lines.mo").write_text(TEXT)
-    result = simulate(load_modelica(tmp_path / "lines.mo")["Lines.Machine"](), stop=1.0)
-    assert result.final("reader.twice.y") == pytest.approx(2.0)
-    assert "other.one.angle" in result
-    assert "other.one.current" not in result
-    assert "bus.two.angle" not in result
 
 
 STAGES = """package Stages

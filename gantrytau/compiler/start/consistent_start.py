@@ -90,10 +90,11 @@ def _consistent_start(
         refuse_outside(flat, reduced, guess.values, error)
         if held or not (guess.fixed or initial):
             raise
-        # a fixed start may belong to a later level than the states that follow it, an initial equation to the first; and
-        # equations may have no value before the initial ones hold
-        others = (_with_initial(flat, reduced, stages), []) if initial else ()
-        for levels in ([indexed.whole], *others):
+        # equations may have no value before the initial ones hold, a fixed start belong to a later level than the states
+        # that follow it, and an initial equation to the first level
+        attempts = [[]] if initial else []
+        attempts += [[indexed.whole], *([_with_initial(flat, reduced, stages)] if initial else [])]
+        for levels in attempts:
             with contextlib.suppress(InitializationError):
                 return led(levels, frozenset())
         raise (_with_nearest(error, stages, guess, started, title) if guess.fixed else error) from None

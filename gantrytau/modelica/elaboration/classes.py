@@ -198,7 +198,6 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
     if _is_connector(structure):
-        body["expandable"] = "expandable" in scope.definition.prefixes
         return type(scope.definition.name, (kind,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)

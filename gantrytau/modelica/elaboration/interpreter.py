@@ -263,9 +263,6 @@ class Interpreter:
             known = value.names()
             if value.has(name):
                 return value.member(name)
-            if getattr(getattr(value, "instance", None), "expandable", False):
-                words = f"expected a declared member; declare it in {value.scope.name}"
-                raise ModelError(f"found '{name}' of an expandable connector, {words}")
         else:
             known = ()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
