@@ -226,3 +226,73 @@ def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants)
     ]  # fmt: skip
     text = translate(instants["Instants.Sampled"](), events=True).equations("base-modelica")
     assert all(words in text for words in ("sample(-0.3, 1)", "sample(2, 0.5)"))
+
+
+BUSES = """package Buses
+  connector Out = output Real;
+  connector In = input Real;
+  connector Pin
+    Real v;
+    flow Real i;
+  end Pin;
+  expandable connector Bus
+    Real speed "declared, and connected";
+    Integer spare "declared, and missing";
+    Bus2 inner_bus;
+  end Bus;
+  expandable connector Bus2
+  end Bus2;
+  model Source
+    parameter Real k;
+    Out y = k * time;
+  end Source;
+  model Sink
+    In u;
+    Real twice = 2 * u;
+  end Sink;
+  model Load
+    parameter Real above = 0;
+    Pin p;
+  equation
+    p.i = p.v - above;
+  end Load;
+  model Unit
+    Bus bus;
+    Bus2 small;
+    Source s(k = 3), t(k = 4), w[2](k = {5, 6});
+    Load load(above = 1);
+  equation
+    connect(s.y, bus.fresh);
+    connect(t.y, small.deep);
+    for k in 1:2 loop
+      connect(w[k].y, bus.many[k]);
+    end for;
+    connect(load.p, bus.pin);
+  end Unit;
+  model Whole
+    Unit unit;
+    Bus bus;
+    Source speed(k = 2);
+    Sink a, b, c, d;
+    Load ground;
+  equation
+    connect(unit.bus, bus);
+    connect(unit.small, bus.inner_bus);
+    connect(speed.y, bus.speed);
+    connect(bus.speed, a.u);
+    connect(b.u, bus.fresh);
+    connect(bus.inner_bus.deep, c.u);
+    connect(bus.many[2], d.u);
+    connect(ground.p, bus.pin);
+  end Whole;
+end Buses;
+"""
+
+
+def test_an_expandable_connector_has_what_is_connected_to_it(tmp_path):
+    (tmp_path / "buses.mo").write_text(BUSES)
+    result = simulate(load_modelica(tmp_path / "buses.mo")["Buses.Whole"](), stop=1.0)
+    assert [result.final(f"{name}.twice") for name in "abcd"] == [4, 6, 8, 12]
+    assert result.final("unit.bus.speed") == 2
+    assert result.final("ground.p.v") == pytest.approx(0.5)
+    assert not any("spare" in name for name in result.names)

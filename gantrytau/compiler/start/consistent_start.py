@@ -1,5 +1,6 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -64,6 +65,14 @@ def _consistent_start(
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free), last.exact)
     title, fixed = flat.name, guess.fixed | held
     started, thorough = guess.started | held, not held
+
+    def with_initial(values: Mapping[str, float]) -> dict[str, float]:
+        if free not in indexed.with_initial:
+            indexed.with_initial[free] = _initial_level(flat, reduced, stages)
+        return solve_levels(
+            [indexed.with_initial[free]], values, held=fixed, started=guess.started, title=title
+        )
+
     try:
         values = solve_levels(
             stages,
@@ -76,6 +85,9 @@ def _consistent_start(
         )
     except InitializationError as error:
         refuse_outside(flat, reduced, guess.values, error)
+        if flat.initial_equations and not held:  # where equations have no value before the initial ones hold
+            with contextlib.suppress(InitializationError):
+                return with_initial(guess.values)
         if held or not guess.fixed:
             raise
         # a fixed start may belong to a later level than the states that have to follow it
@@ -83,13 +95,7 @@ def _consistent_start(
             values = solve_levels([indexed.whole], guess.values, held=fixed, started=started, title=title)
         except InitializationError:
             raise _with_nearest(error, stages, guess, started, title) from None
-    if flat.initial_equations and not held:
-        if free not in indexed.with_initial:
-            indexed.with_initial[free] = _initial_level(flat, reduced, stages)
-        values = solve_levels(
-            [indexed.with_initial[free]], values, held=fixed, started=guess.started, title=title
-        )
-    return values
+    return with_initial(values) if flat.initial_equations and not held else values
 
 
 def _with_nearest(

@@ -222,8 +222,6 @@ def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
     if definition.kind not in kinds:
         words = " ".join((*definition.prefixes, definition.kind))
         found = f"the {words} {name}, expected a model, block, connector or record"
-    elif "expandable" in definition.prefixes:
-        found = "an expandable connector, which is not supported, expected one with declared members"
     elif streams:
         found = f"the stream variable '{streams[0]}', which is not supported, expected potentials and flows"
     elif structure.scope.is_external_object:
@@ -332,6 +330,8 @@ def _component(one: ClassMember) -> Any:
 
 def child_differs(a: Structure, b: Structure) -> bool:
     """Whether two elements of an array have different values of what shapes them."""
+    if a.members.keys() != b.members.keys():
+        return True  # expandable connectors
     for name, one in a.members.items():
         other = b.members[name]
         if one.primitive is not None:

@@ -128,7 +128,9 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             if len(each) > 1:
                 words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
                 attribute.scope.refuse(attribute.at, words)
-            found[name] = bool(each.pop())
+            # of Booleans and Integers it says pre(b) = start, not b = start (chapter 8.6)
+            if one.is_parameter or one.kind == "Real" or name == "free":
+                found[name] = bool(each.pop())
         elif name == "stateSelect":
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
+from gantrytau.modelica.buses.expandable import expand
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
@@ -51,9 +52,8 @@ class Structure:
                 one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
-                where = self.scope.name
-                words = f"found '{name}' modified, which is protected in {where}, expected a public component"
-                one.scope.refuse(one.at, f"{words}; extend {where} to modify it")
+                words = f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component"
+                one.scope.refuse(one.at, f"{words}; extend {self.scope.name} to modify it")
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
     def has(self, name: str) -> bool:
@@ -145,6 +145,8 @@ class Structure:
         for section in self.scope.sections:
             for item in section.items:
                 ask(self, item, section.scope)
+        if self.around is None:
+            expand(self)
 
     def type_of(self, reference: tree.ComponentReference) -> str:
         one = self.leaf(reference)

@@ -58,11 +58,9 @@ class Mpc:
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
     disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
-    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
-    objective is least at the set point (Pannocchia, Rawlings, 2003).
-    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
-    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
-    or [1, 1, 2, 4], the last one to the end.
+    `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
+    disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
+    2003).
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
@@ -100,6 +98,7 @@ class Mpc:
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         check_bounded(self.stages)
         doubt_samples(self.built, self.period)
@@ -203,8 +202,7 @@ class Mpc:
                 linear = self._linear(plan)
             # how far the unknowns are from solving their equations, beside what they are
             if linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max():
-                found = self._improved(plan, linear, x, self.iterations)
-                if found[1]:
+                if (found := self._improved(plan, linear, x, self.iterations))[1]:
                     return found
         return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
 
@@ -244,8 +242,7 @@ class Mpc:
         linear = stages.finite(plan.x[:-1], plan.w, plan.u, times)
         if linear is None:
             return None
-        lower, upper = stages.rows
-        H, g = self.terminal.added(linear, plan)
+        (lower, upper), (H, g) = stages.rows, self.terminal.added(linear, plan)
         P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
         if self.steady is not None:
             P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
@@ -271,8 +268,9 @@ class Mpc:
         return self.stages.compiled()
 
     def reset(self) -> None:
-        """Forget the plan: the next step makes a first one."""
+        """Forget the plan and the estimates: the next step makes a first one."""
         self._plan = self._prepared = None
+        self._estimates |= self._modelled
         self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def run(
@@ -306,11 +304,13 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, foretells what is not finite, and makes no plan anew.
+        It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
+        foretold, or kept, and no plan is made anew.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
-        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+        limits = MOST, self.iterations, STANDS
+        return controller_code(self, self._yielding, self._penalty, unknown, limits, self._estimates)
 
     @property
     def held(self) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""Expandable connectors of Modelica text."""
