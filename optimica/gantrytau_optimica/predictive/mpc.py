@@ -201,9 +201,9 @@ class Mpc:
                 plan = self._plan.shifted(t, self.period)
                 linear = self._linear(plan)
             # how far the unknowns are from solving their equations, beside what they are
-            if linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max():
-                if (found := self._improved(plan, linear, x, self.iterations))[1]:
-                    return found
+            near = linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max()
+            if near and (found := self._improved(plan, linear, x, self.iterations))[1]:
+                return found
         return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
 
     def _improved(
