@@ -96,6 +96,15 @@ class Kernel:
         self.function, self.there, self._next = found, True, math.inf
         return True
 
+    def wait(self) -> bool:
+        """Wait for the kernel, whoever compiles it; whether it is there."""
+        working = True
+        while working and not self.there and self._next < math.inf:
+            time.sleep(max(self._next - time.monotonic(), 0.0))
+            working = not self._key or (self._folder / f"{self._key}.work").exists()
+            self.called(0.0, math.inf, wait=True)
+        return self.there
+
     def _found(self, begin: bool, wait: bool) -> ca.Function | None:
         """The kernel of the cache. Without one, a process is started to compile it, unless another process does so."""
         if not self._key:

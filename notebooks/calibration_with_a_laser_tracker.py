@@ -280,6 +280,20 @@ print(
 assert apart < 1e-9
 
 # %% [markdown]
+# ## The same by Ipopt
+#
+# Gauss-Newton is the default. `method="ipopt"` hands the same least squares to CasADi and Ipopt, by other derivatives and
+# other steps: a check, and what limits among the parameters need.
+
+# %%
+by_ipopt = calibrate(drawn, data, method="ipopt")
+apart = max(np.abs(by_ipopt.parameters[name] - each.parameters[name]).max() for name in each.parameters)
+print(
+    f"{each.iterations} steps of Gauss-Newton, {by_ipopt.iterations} of Ipopt; parameters apart by {apart:.0e} m"
+)
+assert apart < 1e-8
+
+# %% [markdown]
 # ## What the data hold
 #
 # Each arm has seven parameters, and these poses determine all of them. Places in one plane do not, and that is said.

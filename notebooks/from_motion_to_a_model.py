@@ -23,9 +23,11 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 
-from gantrytau import Input, linearize, prbs, simulate, translate
+from gantrytau import Input, Parameter, exp, linearize, prbs, simulate, tanh, translate
 from gantrytau.kinematics import Kinematics
 from gantrytau.mechanics.filters import LowPass
+from gantrytau.mechanics.friction_laws import asymmetric_friction
+from gantrytau.mechanics.translational import AsymmetricFriction, Friction
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
 from gantrytau_optimica import (
     MotionLog,
@@ -210,13 +212,31 @@ assert max(found.deviations[link] for link in links) < 0.6 < min(by_sines.deviat
 #
 # Table 6.3 of the thesis compares four models by what they leave of the forces: without viscous friction, with all friction
 # identified, with friction as it was at constant speed, and with only its viscous part from there. They are one call. Since
-# the runs at constant speed this robot was greased.
+# the runs at constant speed this robot was greased, and rubs by 12 % more forth than back, with 40 N more at rest: so it
+# is none of the models, and no order is built in.
+
 
 # %%
-greased = replace(
-    TRUTH, coulomb=tuple(0.8 * f for f in TRUTH.coulomb), viscous=tuple(0.8 * f for f in TRUTH.viscous)
-)
-later = measured(t, excitation.log.r, seed=102, robot=translate(Led(greased), given=["reference"]))
+class Guideway(AsymmetricFriction):
+    """Friction that differs with the direction and falls from rest."""
+
+    f_s = Parameter(40.0, unit="N", description="what static friction has beyond Coulomb friction")
+    v_stribeck = Parameter(0.1, unit="m/s", description="Stribeck speed")
+
+    def equations(self):
+        yield from Friction.equations(self)
+        static = self.f_s * exp(-((self.v / self.v_stribeck) ** 2)) * tanh(self.v / self.v_s)
+        yield self.f == asymmetric_friction(self.v, self.f_c, self.f_v, self.v_s) + static
+
+
+def greased(numbers):
+    """By direction: forth and back."""
+    return [(0.8 * 1.12 * x, 0.8 * 0.88 * x) for x in numbers]
+
+
+rough = replace(TRUTH, coulomb=greased(TRUTH.coulomb), viscous=greased(TRUTH.viscous))
+rough_robot = translate(Led(rough, friction=Guideway), given=["reference"])
+later = measured(t, excitation.log.r, seed=102, robot=rough_robot)
 models = {
     f"model {name}": model | dict(minimum_speed=0.2)
     for name, model in printed_models(friction.coulomb, friction.viscous).items()
@@ -226,7 +246,8 @@ print(table)
 assert table.ranking == ("model 2", "model 4", "model 1", "model 3")
 
 # %% [markdown]
-# The ranking is that of the thesis, and masses pay for the friction of another day.
+# The ranking is that of the thesis, and masses pay for the friction of another day. How far it changed decides: with
+# friction of the same day, the page of the thesis shows, model 3 is the best.
 #
 # ## The robot as it was identified
 #

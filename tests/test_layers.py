@@ -25,7 +25,7 @@ ORDER = {  # a room imports the rooms before it
     "gantrytau_models": "quantities prototypes mechanisms control leadthrough __init__",
     "gantrytau_optimica": "problem text control transcription solving failures answers refinement policy "
     "guesses_and_parameters prepared optimize "
-    "studies fitting predictive estimation paths calibration procedure identification learning vision __init__",
+    "studies fitting estimation predictive paths calibration procedure identification learning vision __init__",
     "gantrytau_optimica.calibration": "data links fitting design diagnostics report named calibration calibrate "
     "devices assessment error_analysis __init__",
     "gantrytau_optimica.procedure": "plan_goal stages nearest_bodies robot_samples workspace_resolution candidates "

@@ -3,7 +3,7 @@
 from gantrytau_fmu.building.archive import check_target
 from gantrytau_fmu.controller.channels import Channel
 from gantrytau_fmu.description import DefaultExperiment
-from gantrytau_fmu.export import SOLVERS, Build, export_fmu
+from gantrytau_fmu.export import SOLVERS, Build, export_code, export_fmu
 from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import no_file
@@ -28,6 +28,7 @@ __all__ = [
     "check_system",
     "check_target",
     "cosimulate",
+    "export_code",
     "export_fmu",
     "no_file",
     "read_fmu",

@@ -10,7 +10,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-from gantrytau import Dae, Model, translate
+import casadi as ca
+
+from gantrytau import Dae, Input, Model, Real, sampled, translate
+from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import check_words, instance, number, one_of
 from gantrytau.border.refusal import Given, ModelError
 from gantrytau_fmu.building.archive import binary_members, check_target, write_archive
@@ -21,6 +24,7 @@ from gantrytau_fmu.code.formulas import Formulas, formulas_of
 from gantrytau_fmu.code.jumps import with_ends_of_tables
 from gantrytau_fmu.code.model_code import model_code
 from gantrytau_fmu.code.model_graph import entered
+from gantrytau_fmu.describing.description_checks import STRUCTURED
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.model_description import COMPILED, build_description, model_description
@@ -86,16 +90,66 @@ def export_fmu(
     about: Build = instance("export_fmu", "build", Build() if build is None else build, Build)
     check_target(path)
     dae = _translated(model, given, find, states)
-    dae = with_ends_of_tables(dae)
+    about = replace(about, description=about.description or _description(model, dae))
+    about = replace(about, experiment=about.experiment or DefaultExperiment(tolerance=tolerance))
+    return _exported(with_ends_of_tables(dae), find, path, _Request(fmi, kinds, solver, tolerance, about))
+
+
+def export_code(
+    code: SampledCode, path: str | Path, *, fmi: Literal["3.0", "2.0"] = "3.0", build: Build | None = None
+) -> Path:
+    """Write the C of a sampled controller as FMU for Co-Simulation and return its path; its variables have the code's names.
+
+    fmi, build: as in `export_fmu`. A step that begins at a sampling instant takes the sample, the first one at the start.
+    Saved states hold the controller's memory. Raises ModelError for code in single precision, and what `export_fmu` does.
+    """
+    check_words(export_code, {"fmi": fmi})
+    about: Build = instance("export_code", "build", Build() if build is None else build, Build)
+    instance("export_code", "code", code, SampledCode)
+    if code.real != "double":
+        raise ModelError(
+            "expected code in double precision", place="export_code", found=Given("real", code.real)
+        )
+    check_target(path)
+    words = f"{code.name}, a controller in C, sampled every {code.period:g} s"
+    about = replace(about, description=about.description or words)
+    about = replace(about, experiment=about.experiment or DefaultExperiment(step=code.period))
+    dae = translate(_around(code), events=True)
+    request = _Request(
+        fmi, ("co-simulation",), SOLVERS[0], DefaultExperiment().tolerance or 1e-6, about, code
+    )
+    return _exported(dae, [f"found_{k}" for k in range(len(code.find))], path, request)
+
+
+@dataclass(frozen=True)
+class _Request:
+    """How an FMU is written; code: C that takes its samples, else its formulas do."""
+
+    fmi: Literal["3.0", "2.0"]
+    kinds: tuple[Interfaces, ...]
+    solver: str
+    tolerance: float
+    about: Build
+    code: SampledCode | None = None
+
+
+def _exported(dae: Dae, find: Sequence[str], path: str | Path, request: _Request) -> Path:
+    """The file of a translated model."""
+    fmi, kinds, solver, tolerance = request.fmi, request.kinds, request.solver, request.tolerance
+    about = request.about
     outputs, others = _shown(dae, find)
     graph = entered(formulas_of(dae, [*outputs, *others]))
     contents = contents_of(graph, outputs, others)
-    about = replace(about, description=about.description or _description(model, dae))
-    about = replace(about, experiment=about.experiment or DefaultExperiment(tolerance=tolerance))
-    token = _token(graph.formulas, contents, fmi, solver, tolerance)
+    if request.code is not None:
+        own = _own_names(request.code)
+        contents = contents.renamed(own, request.code.units)
+        # in log lines, too
+        held = tuple(own[name] for name in graph.formulas.held)
+        graph = replace(graph, formulas=replace(graph.formulas, held=held))
+    token = _token(graph.formulas, contents, request)
     fmu = _described(graph.formulas, contents, about, token, kinds)
     code = model_code(graph, contents, name=fmu.name, token=token, interfaces=kinds, tolerance=tolerance)
-    texts = source_files(code.text, solver)
+    texts = source_files(_controlled(request.code) + code.text, solver)
     binaries = _compiled(texts, chosen(about.platforms), fmu.identifier, code.operations)
     fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
     if about.sources or not binaries:
@@ -160,10 +214,40 @@ def _found(dae: Dae, name: str) -> str:
     return name
 
 
-def _token(formulas: Formulas, contents: Contents, fmi: str, solver: str, tolerance: float) -> str:
+def _around(code: SampledCode) -> Model:
+    """A model with the inputs and outputs of a controller in C, which stands in the place of its sampled formulas."""
+    inputs = {f"given_{k}": Input(start=0.0) for k in range(len(code.given))}
+    outputs = {f"found_{k}": Real(start=0.0) for k in range(len(code.find))}
+
+    def equations(self: Model):
+        for name in outputs:
+            whole = ca.sum1(ca.vertcat(*(getattr(self, one) for one in inputs)))
+            yield sampled(getattr(self, name), whole, period=code.period)
+
+    kind = type(code.name, (Model,), {**inputs, **outputs, "equations": equations, "__module__": __name__})
+    return kind()
+
+
+def _own_names(code: SampledCode) -> dict[str, str]:
+    """Names of the FMU's variables by those of the model around it; what is no structured name stands in apostrophes."""
+    placed = [f"given_{k}" for k in range(len(code.given))] + [f"found_{k}" for k in range(len(code.find))]
+    shown = [n if STRUCTURED.fullmatch(n) else f"'{n}'" for n in (*code.given, *code.find)]
+    return dict(zip(placed, shown, strict=True))
+
+
+def _controlled(code: SampledCode | None) -> str:
+    """What stands before model.c: a controller in C, all of it in this one unit."""
+    if code is None:
+        return ""
+    source = code.source.replace('#include "controller.h"', code.header)
+    return f"#define CASADI_SYMBOL_EXPORT static\n#define GT_CONTROLLER\n{source}"
+
+
+def _token(formulas: Formulas, contents: Contents, request: _Request) -> str:
     """The same for the same model: a hash of its formulas and variables, in the form of a UUID."""
     variables = [astuple(variable) for variable in contents.variables]
-    text = f"{variables}{fmi}{solver}{tolerance}{formulas.rates}{formulas.residuals}"
+    text = f"{variables}{request.fmi}{request.solver}{request.tolerance}{formulas.rates}{formulas.residuals}"
+    text += _controlled(request.code)
     digits = hashlib.sha256(text.encode()).hexdigest()
     return "{" + "-".join((digits[:8], digits[8:12], digits[12:16], digits[16:20], digits[20:32])) + "}"
 

@@ -11,11 +11,11 @@ from typing import Literal
 class SampledCode:
     """C99 of a sampled controller: `controller_init`, `controller_step` and their memory `controller_state`, no heap.
 
-    given, find: names of scalars in the order of the arrays; period: s; real: type of C; units: of these names; header,
-    source: texts of `controller.h` and `controller.c`. Memory of zeros is that of a controller before its first step, unless
-    `controller_init` says otherwise.
+    given, find: names of scalars in the order of the arrays; period: s; real: type of C; units: by name;
+    header, source: texts of `controller.h` and `controller.c`.
     """
 
+    name: str
     given: tuple[str, ...]
     find: tuple[str, ...]
     period: float

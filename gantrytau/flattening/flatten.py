@@ -22,7 +22,7 @@ from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, St
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
 from gantrytau.flattening.instants import Events, read_delays, read_events, sides, with_sides, with_starts
 from gantrytau.flattening.loop_closures import Closure
-from gantrytau.flattening.propagation import Spread, Tree, defining, spanning_tree
+from gantrytau.flattening.propagation import Spread, Tree, defining, inlined, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
 from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
@@ -127,8 +127,7 @@ def write_out(instance: Instance) -> FlatModel:
     with writing(instance.symbols):
         stated = _stated(instance)
         equations, connections = stated.equations, stated.connections
-        tree = _tree_of(stated, instance)
-        passed_on = defining(instance, tree, equations)
+        passed_on = defining(instance, tree := _tree_of(stated, instance), equations)
         used = {id(one) for one, _ in passed_on.values()}
         equations = [one for one in equations if id(one) not in used]
         equations += [*_of_the_ways(stated.ways, tree), *_bindings(instance)]
@@ -149,7 +148,7 @@ def write_out(instance: Instance) -> FlatModel:
         refuse_absent(everything, names, absent)
         refuse_starts(instance, absent)
         placed = [p for p in instance.quantities if not absent.keys() & set(p.elements)]
-        kinds = _kinds(placed)
+        kinds = _kinds(placed, spread)
         parameters = tuple(flat_parameter(p) for p in placed if kinds[p.name] == "parameter")
         moving = (flat_variable(p) for p in placed if kinds[p.name] not in ("parameter", "propagated"))
         variables = with_starts(tuple(moving), events)
@@ -200,8 +199,9 @@ def _said(instance: Instance) -> dict[str, Any]:
     )
 
 
-def _kinds(placed: Sequence[Placed]) -> dict[str, str]:
-    return {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
+def _kinds(placed: Sequence[Placed], spread: Spread) -> dict[str, str]:
+    kinds = {p.name: "parameter" if _is_parameter(p) else p.declaration.kind for p in placed}
+    return kinds | {p.name: "propagated" for p in inlined(placed) if p.elements[0] in spread.definitions}
 
 
 def _ranges(symbols: Symbols, spread: Spread) -> tuple[Range, ...]:

@@ -15,7 +15,7 @@ import casadi as ca
 from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.flattening.flat_checks import first_with
 from gantrytau.flattening.flat_model import Loop
-from gantrytau.flattening.instantiation import Instance
+from gantrytau.flattening.instantiation import Instance, Placed
 from gantrytau.language.model import Connector, Model
 from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.statements import Branch, Connection, Equation, Root
@@ -135,34 +135,84 @@ def symbol_of(connector: Any, name: str) -> Any:
     return reduce(getattr, name.split("."), connector)
 
 
-def defining(
-    instance: Instance, tree: Tree, equations: Sequence[Equation]
-) -> dict[str, tuple[Equation, ca.SX]]:
-    """The equations that say what is passed on by branches and roots without values of their own, by scalar name.
+# scalar name -> an equation, and the side of it that says what the scalar is
+Definitions = Mapping[str, tuple[Equation, ca.SX]]
 
-    Each has a lone symbol on one side; on the other one stand quantities only of connectors that are nearer to the root.
+
+class _Defining:
+    """Chooses among equations with a lone symbol on one side those that define it.
+
+    unreached: scalars of connectors to which the tree has not come yet; found: the definitions, each behind those it needs.
     """
-    lone: dict[str, list[tuple[Equation, ca.SX]]] = {}
-    for one in equations:
-        for side, other in ((one.left, one.right), (one.right, one.left)):
-            symbol = instance.symbols.find(side)
-            if symbol is not None and symbol.kind == "propagated" and not symbol.order:
-                lone.setdefault(symbol.name, []).append((one, other))
+
+    def __init__(self, instance: Instance, equations: Sequence[Equation], unreached: set[str]):
+        self.found: dict[str, tuple[Equation, ca.SX]] = {}
+        self.unreached, self._used, self._busy = unreached, set[int](), set[str]()
+        self.inlined = dict.fromkeys(n for p in inlined(instance.quantities) for n in p.elements)
+        self._lone: dict[str, list[tuple[Equation, ca.SX]]] = {}
+        for one in equations:
+            for side, other in ((one.left, one.right), (one.right, one.left)):
+                symbol = instance.symbols.find(side)
+                if (
+                    symbol is not None
+                    and not symbol.order
+                    and (symbol.kind == "propagated" or symbol.name in self.inlined)
+                ):
+                    self._lone.setdefault(symbol.name, []).append((one, other))
+
+    def define(self, name: str, needed: bool = False) -> bool:
+        """Whether a scalar has a definition by what is known; needed: variables may stand in it, which then remain such."""
+        self._busy.add(name)
+        for one, side in self._lone.get(name, ()) if name not in self.found else ():
+            leaves = dict.fromkeys(split_derivative(leaf)[0] for leaf in leaf_names([side]))
+            if id(one) in self._used or name in leaves or not self.unreached.isdisjoint(leaves):
+                continue
+            inside = [n for n in leaves if n in self.inlined]
+            open_ones = [n for n in inside if n in self._busy or not self.define(n)]
+            if needed or not open_ones:
+                for n in open_ones:
+                    del self.inlined[n]
+                self._used.add(id(one))
+                self.found[name] = one, side
+                break
+        self._busy.discard(name)
+        return name in self.found
+
+
+def inlined(quantities: Iterable[Placed]) -> Iterator[Placed]:
+    """Those of which an equation may say what they are."""
+    for one in quantities:
+        fixed = one.attributes.get("fixed")
+        if (
+            getattr(one.declaration, "inlined", False)
+            and not (fixed and fixed.value)
+            and "value" not in one.attributes
+        ):
+            yield one
+
+
+def defining(instance: Instance, tree: Tree, equations: Sequence[Equation]) -> Definitions:
+    """What equations say of quantities that are passed on by branches and roots without values, and of inlined variables.
+
+    On the side that defines a quantity of a connector stand quantities only of connectors that are nearer to the root.
+    """
     names = {
         p: [(n, s.name()) for n in propagated(c) for s in scalars(symbol_of(c, n))]
         for p, c in tree.nodes.items()
     }
-    open_names = {name for each in names.values() for _, name in each}
-    found: dict[str, tuple[Equation, ca.SX]] = {}
+    those = _Defining(instance, equations, {name for each in names.values() for _, name in each})
     for path, edge, root in tree.reached:
         given = _given(path, tree.nodes[path], edge, root, instance, tree)
         for whole, name in names[path]:
-            own = () if whole in given else lone.get(name, ())
-            known = (each for each in own if open_names.isdisjoint(leaf_names([each[1]])))
-            if (first := next(known, None)) is not None:
-                found[name] = first
-            open_names.discard(name)
-    return found
+            if whole not in given:
+                those.define(name, needed=True)
+            those.unreached.discard(name)
+    for name in [*those.inlined]:
+        if name in those.inlined:
+            those.define(name)
+    elements = [p.elements for p in inlined(instance.quantities)]
+    partly = {n for each in elements if not those.found.keys() >= {*each} for n in each}
+    return {name: one for name, one in those.found.items() if name not in partly}
 
 
 def _from_the_roots(
@@ -201,7 +251,7 @@ def _round(instance: Instance, closing: _Edge, way: Mapping[str, _Edge | None]) 
 
 
 def propagate(
-    instance: Instance, tree: Tree, stated: Mapping[str, tuple[Equation, ca.SX]]
+    instance: Instance, tree: Tree, stated: Definitions
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
     """What propagated scalars are: those equal to a number or another symbol, and the expressions of the others.
 
@@ -210,15 +260,26 @@ def propagate(
     """
     plain: dict[str, ca.SX] = {}
     defined: dict[str, ca.SX] = {}
+    nodes = {s.name() for c in tree.nodes.values() for n in propagated(c) for s in scalars(symbol_of(c, n))}
+    others = iter([*((name, side) for name, (_, side) in stated.items()), ("", ca.SX(0))])
+
+    def add(name: str, element: ca.SX) -> None:
+        (plain if element.is_constant() or element.is_symbolic() else defined)[name] = element
+
+    def add_others(until: str) -> None:
+        for name, side in others:
+            if name == until:
+                return
+            if name not in nodes:
+                add(name, _without(plain, [side])[0])
+
     for path, edge, root in tree.reached:
         connector = tree.nodes[path]
         given = _given(path, connector, edge, root, instance, tree)
         for name, declaration in propagated(connector).items():
             symbols = scalars(symbol_of(connector, name))
-            value, own = (
-                given.get(name, declaration.start),
-                [stated[s.name()][1] for s in symbols if s.name() in stated],
-            )
+            own = [stated[s.name()][1] for s in symbols if s.name() in stated]
+            value = given.get(name, declaration.start)
             if value is None and len(own) < len(symbols):
                 where = "at this root" if edge is None else f"from {edge.a if path == edge.b else edge.b}"
                 raise ModelError(
@@ -230,9 +291,12 @@ def propagate(
                 raise ModelError(
                     f"{path}: {name} is given with shape {ca.SX(value).shape}, expected {symbol_of(connector, name).shape}"
                 )
+            if elements is own:
+                for symbol in symbols:
+                    add_others(until=symbol.name())
             for symbol, element in zip(symbols, _without(plain, elements), strict=True):
-                simple = element.is_constant() or element.is_symbolic()
-                (plain if simple else defined)[symbol.name()] = element
+                add(symbol.name(), element)
+    add_others(until="")
     return plain, defined
 
 
@@ -274,7 +338,7 @@ class Spread:
     definitions: expressions by scalar name; rates: declared time derivatives of those that are not plain.
     """
 
-    def __init__(self, instance: Instance, tree: Tree, stated: Mapping[str, tuple[Equation, ca.SX]]):
+    def __init__(self, instance: Instance, tree: Tree, stated: Definitions):
         self._symbols = instance.symbols
         self._plain, defined = propagate(instance, tree, stated)
         self._nodes = tree.nodes

@@ -187,6 +187,8 @@ class Real(Quantity):
     undetermined: the likely cause where the equations do not determine it, for messages.
     """
 
+    inlined = False  # whether it is an expression where an equation has it alone on a side
+
 
 class Input(Quantity):
     """A variable that is known from outside; the optimiser chooses it, `simulate` is given it."""

@@ -194,6 +194,13 @@ def note_range(expression: ca.SX, low: float, high: float) -> None:
         symbols.ranges.append(Range(expression, low, high))
 
 
+def of_parameters(expression: ca.SX) -> bool:
+    """Whether an expression of the model that is written out holds parameters only."""
+    symbols = _current.get()
+    found = [None if symbols is None else symbols.find(leaf) for leaf in ca.symvar(expression)]
+    return all(one is not None and one.kind == "parameter" for one in found)
+
+
 def delayed(expressions: Iterable[ca.SX], time: ca.SX) -> list[ca.SX]:
     """The symbols of scalar expressions as they were some time ago; ModelError outside of the equations of a model."""
     symbols = _current.get()

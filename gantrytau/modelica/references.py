@@ -72,6 +72,13 @@ def component_of(call: tree.Call, reader: Any) -> Any:
     return reader.value(replace(call.function, parts=tuple(path)))
 
 
+def declared_shape(e: tree.Expression, reader: Any) -> tuple[int, ...] | None:
+    """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
+    name = dotted(e)
+    known = name and "." not in name and name not in reader.local and reader.members.has(name)
+    return reader.members.shape(name) if known else None
+
+
 def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
     """The connections among equations, with the loops and conditions around them."""
     found = []

@@ -44,10 +44,29 @@ def ask_for_shapes(structure: Any, item: Any, scope: Any, local: frozenset[str] 
             structure.read.intersection_update(before)
 
 
+def is_known(structure: Any, reference: tree.ComponentReference) -> bool:
+    """Whether a reference leads to a parameter or constant, or to a record of such."""
+    if not structure.has(reference.parts[0][0]):
+        return reference.parts[0][0] != "time"
+    here = structure
+    for name, _ in reference.parts:
+        one = here.members.get(name) if here is not None else None
+        if one is None or one.primitive is not None:
+            return one is None or one.is_parameter
+        here = one.children[0] if one.children else None
+    return here is None or here.scope.definition.kind != "record" or _is_constant(here)
+
+
+def _is_constant(structure: Any) -> bool:
+    """Whether all in a record are parameters and constants."""
+    each = structure.members.values()
+    return all(m.is_parameter if m.primitive else all(map(_is_constant, m.children)) for m in each)
+
+
 def _ask_names(structure: Any, expression: Any, scope: Any, local: frozenset[str]) -> None:
     """Fold the parameters in an expression, unless a variable stands in it, too."""
     found = [one for one in references(expression) if one.parts[0][0] not in local]
-    if all(map(structure.is_known, found)):
+    if all(is_known(structure, one) for one in found):
         for one in (one for one in found if structure.has(one.parts[0][0])):
             whole = tuple((name, ()) for name, _ in one.parts)
             structure.interpreter(scope).value(tree.ComponentReference(one.at, whole))

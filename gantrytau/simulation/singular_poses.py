@@ -92,11 +92,12 @@ class Conditioning:
         self._symbols = list(arguments), everything
         self._steps = [k for k in steps if ca.depends_on(everything, arguments[-1][k])]
         self._scales: dict[bytes, list[Scale]] = {}
+        self._first: dict[bytes, np.ndarray] = {}
 
     def anew(self) -> "Conditioning":
         """A copy for another run, which gets scales of its own points."""
         found = copy(self)
-        found._scales = {}
+        found._scales, found._first = {}, {}
         return found
 
     @property
@@ -127,6 +128,7 @@ class Conditioning:
         scales = self._scales.setdefault(side.tobytes(), [])
         if not scales:
             sure = self._sure(values[:1], [p[:1] for p in points])
+            self._first[side.tobytes()] = np.concatenate([np.ravel(p[:1]) for p in points])
             scales += [_scale(m[0], one) for m, one in zip(matrices, sure, strict=True)]
         distances = [_least(m, scale) for m, scale in zip(matrices, scales, strict=True)]
         sign = np.ones(len(values))
@@ -134,6 +136,12 @@ class Conditioning:
             rows, columns, _ = scales[0]
             sign = np.linalg.slogdet((constraints / rows / columns)[:, :, self._dependent])[0]
         regular = np.all([d > LEAST for d in distances[1:]], axis=0) if blocks else np.ones(len(values), bool)
+        for k in np.flatnonzero(
+            ~regular
+        ).tolist():  # small as their terms are, as conductances of a diode that closes
+            terms = self._terms([p[k : k + 1] for p in points], self._first[side.tobytes()])[1:]
+            own = [_least(m[k : k + 1], _scale(t, 0)) for m, t in zip(blocks, terms, strict=True)]
+            regular[k] = np.all(np.concatenate(own) > LEAST)
         return Look(sign, distances[0], regular)
 
     def _matrices(self, values: np.ndarray) -> list[np.ndarray]:
@@ -151,14 +159,20 @@ class Conditioning:
         most = [(m.max(axis=1, keepdims=True, initial=0.0), m.max(axis=0, initial=0.0)) for m in sizes]
         sure = [(m > NOISE * r) ^ (m > NOISE * c) for m, (r, c) in zip(sizes, most, strict=True)]
         if any(np.any(one) for one in sure):
-            arguments, everything = self._symbols
-            terms = ca.Function("terms", arguments, [ca.vertcat(*term_sizes(everything.elements()))])
-            rounding = self._matrices(ROUNDING * AtPlaces(terms)(*point)[0])
-            sure = [one & (m > r[0]) for one, m, r in zip(sure, sizes, rounding, strict=True)]
+            terms = self._terms(point)
+            sure = [one & (m > ROUNDING * r) for one, m, r in zip(sure, sizes, terms, strict=True)]
         return [one.astype(int) for one in sure]
 
+    def _terms(self, point: Sequence[np.ndarray], first: np.ndarray | None = None) -> list[np.ndarray]:
+        """Sizes of the terms of all entries at a point; first: a point by whose numbers symbols have a size at least."""
+        arguments, everything = self._symbols
+        names = [one.name() for one in ca.vertcat(*arguments).elements()]
+        least = None if first is None else dict(zip(names, np.abs(first).tolist(), strict=True))
+        terms = ca.Function("terms", arguments, [ca.vertcat(*term_sizes(everything.elements(), least))])
+        return [m[0] for m in self._matrices(AtPlaces(terms)(*point)[0])]
 
-def _scale(matrix: np.ndarray, sure: np.ndarray) -> Scale:
+
+def _scale(matrix: np.ndarray, sure: np.ndarray | int) -> Scale:
     """Lengths of rows and columns, and the smallest singular value of the matrix divided by them."""
     rows, columns = _lengths(matrix, sure)
     if matrix.size == 0:

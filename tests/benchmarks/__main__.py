@@ -25,6 +25,7 @@ from tests.benchmarks import (
     surface_seeds,
     vision,
 )
+from tests.benchmarks.in_the_loop import rows as in_the_loop
 from tests.benchmarks.peers import rows as peers
 from tests.benchmarks.table import Row, at_most, print_table
 
@@ -57,6 +58,7 @@ if __name__ == "__main__":
         peg_seeds.rows(),
         surface_seeds.rows(),
         vision.rows(),
+        in_the_loop.rows(),
     )
     parts = (*mechanics, procedure.rows(), growth.rows(), answers.rows(), *timed, _duration(begin))
     sys.exit(print_table("Benchmarks", parts))

@@ -16,7 +16,7 @@ from tests.classics.summary import print_family, write_families
 
 ROOT = Path(__file__).parents[2]
 PROCESSES = 2
-TIME_LIMIT = 300.0  # s
+TIME_LIMIT = 600.0  # s
 
 
 def measured(family: str, name: str, limit: float) -> Row:
@@ -44,7 +44,7 @@ def main() -> int:
         raise SystemExit(f"classics: found ONLY={only}, expected one of {known}")
     found: dict[str, dict[str, Row]] = {}
     with ThreadPoolExecutor(PROCESSES) as pool:
-        for family, names in asked.items():
+        for family, names in ((family, names) for family, names in asked.items() if names):
             rows = pool.map(lambda name, family=family: measured(family, name, limit), names)
             found[family] = dict(zip(names, rows, strict=True))
             print_family(family, found[family])

@@ -1,5 +1,7 @@
 """Mechanisms of the IFToMM benchmark library (Gonzalez and others, 2006; lim.ii.udc.es/mbsbenchmark), from components."""
 
+from typing import Any
+
 import numpy as np
 
 from gantrytau import Array, Fixed, Model, Start, connect
@@ -9,14 +11,10 @@ from tests.mechanisms.rows import row
 X, Y, Z = ([float(k == axis) for k in range(3)] for axis in range(3))
 
 
-def bar(*lengths: float, m: float = 1.0) -> multibody.Body:
-    """A uniform bar from the origin of its frame: along one axis `lengths` is how far, along the others how thick."""
-    size = np.array(lengths)
-    along = np.abs(size) == np.abs(size).max()
-    square = size**2
-    return multibody.Body(
-        m=m, r_cm=(along * size / 2).tolist(), J=np.diag(m * (square.sum() - square) / 12).tolist()
-    )
+def bar(r: list[float], thick: float = 0.0, m: float = 1.0) -> dict[str, Any]:
+    """What makes a body a uniform bar of square section, from its frame to r along an axis of it."""
+    size = np.where(r, np.abs(r), thick) ** 2
+    return dict(m=m, r_cm=[x / 2 for x in r], J=np.diag(m * (size.sum() - size) / 12).tolist())
 
 
 class SimplePendulum(Model):
@@ -32,15 +30,32 @@ class SimplePendulum(Model):
 
 def windows(count: int) -> type[Model]:
     """A02: four-bars side by side, slender rods of 1 kg and 1 m; upright, the couplers move at 1 m/s along x."""
-    grounds = [dict(r=[float(k), 0.0, 0.0]) for k in range(count + 1)]
-    starts = [dict(n=Z, phi=Fixed(0.0), w=Fixed(-1.0)), *(dict(n=Z, phi=Start(0.0)) for _ in range(count))]
+    feet = [dict(r=[float(k), 0.0, 0.0]) for k in range(count + 1)]
+    starts = [dict(phi=Fixed(0.0), w=Fixed(-1.0)), *(dict(phi=Start(0.0)) for _ in range(count))]
 
     class NFourBar(Model):
         world = multibody.World(gravity=[0.0, -9.81, 0.0])
-        grounds_ = Array(multibody.Fixed, grounds)
-        hinges = Array(multibody.Revolute, starts)
-        uprights = Array(multibody.FixedTranslation, count + 1, r=Y)
-        couplers = Array(multibody.FixedTranslation, count, r=X)
+        grounds = Array(multibody.Fixed, feet)
+        hinges = Array(multibody.Revolute, starts, n=Z)
+        uprights, couplers = (
+            Array(multibody.Body, count + 1, **bar(Y)),
+            Array(multibody.Body, count, **bar(X)),
+        )
+        up, across = (
+            Array(multibody.FixedTranslation, count + 1, r=Y),
+            Array(multibody.FixedTranslation, count, r=X),
+        )
+        left, right = (Array(multibody.Revolute, [dict(phi=Start(0.0))] * count, n=Z) for _ in range(2))
+
+        def equations(self):
+            for ground, hinge, body, rod in zip(
+                self.grounds, self.hinges, self.uprights, self.up, strict=True
+            ):
+                yield from row(ground, hinge, body)
+                yield connect(hinge.frame_b, rod.frame_a)
+            for k, (body, rod) in enumerate(zip(self.couplers, self.across, strict=True)):
+                yield from row(self.up[k], self.left[k], body)
+                yield from row(self.left[k], rod, self.right[k], self.up[k + 1].frame_b)
 
     return NFourBar
 
@@ -55,15 +70,12 @@ class Bricard(Model):
     fifth, sixth = multibody.Revolute(n=Z), multibody.Revolute(n=X)
     ways = ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     rods = Array(multibody.FixedTranslation, [dict(r=way) for way in ways])
-    r1, r2, r3 = bar(1.0, 0.1, 0.1), bar(0.1, -1.0, 0.1), bar(0.1, 0.1, 1.0)
-    r4, r5 = bar(-1.0, 0.1, 0.1), bar(0.1, 1.0, 0.1)
+    bodies = Array(multibody.Body, [bar(way, 0.1) for way in ways])
 
     def equations(self):
         joints = (self.first, self.second, self.third, self.fourth, self.fifth)
         place = self.world.frame_b
-        for joint, body, rod in zip(
-            joints, (self.r1, self.r2, self.r3, self.r4, self.r5), self.rods, strict=True
-        ):
+        for joint, body, rod in zip(joints, self.bodies, self.rods, strict=True):
             yield from row(place, joint, body)
             yield connect(joint.frame_b, rod.frame_a)
             place = rod.frame_b
@@ -76,7 +88,7 @@ class FlyballGovernor(Model):
     world = multibody.World()
     bearing = multibody.Revolute(n=Z, phi=Fixed(0.0), w=Fixed(2 * np.pi))
     slide = multibody.Prismatic(n=Z, s=Fixed(0.5), v=Fixed(0.0))
-    shaft = bar(0.01, 0.01, 1.0, m=0.3)
+    shaft = multibody.Body(**bar(Z, 0.01, m=0.3))
     slider = multibody.Body(m=3.0, J=np.diag([0.005] * 3).tolist())
     sides = (1.0, -1.0)
     shoulders = Array(multibody.FixedTranslation, [dict(r=[0.05 * side, 0.0, 1.0]) for side in sides])

@@ -2,6 +2,7 @@
 
 from typing import Any, cast
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -19,9 +20,12 @@ from gantrytau import (
     der,
     simulate,
     sin,
+    time,
     translate,
     with_setting,
 )
+from gantrytau.compiler.start.consistency import _solve
+from gantrytau.compiler.start.level import Level
 from gantrytau.mechanics import multibody
 from gantrytau.mechanics.translational import Mass
 from gantrytau_models import FourBar
@@ -196,3 +200,28 @@ def test_a_start_that_moves_is_told_at_every_size(size):
 
     (moved,) = translate(Moved(), units=False).diagnosis.moved
     assert (moved.name, moved.asked, moved.found) == ("x", 2 * size, size)
+
+
+def test_equations_without_a_value_before_the_initial_ones_hold():
+    class Measured(Model):
+        """A filter whose input is divided by its output, which starts there."""
+
+        u = Real(start=1.0)
+        y = Real()
+
+        def equations(self):
+            yield self.u == 2 + sin(time)
+            yield der(self.y) == self.u / self.y - 1
+
+        def initial_equations(self):
+            yield self.y == self.u
+
+    assert translate(Measured()).start["y"] == pytest.approx(2)
+
+
+def test_an_infinite_slope_at_the_solution_is_no_obstacle_to_the_start():
+    u, y, w = (ca.SX.sym(name) for name in "uyw")
+    rows = (u, y + 1.5 - ca.sqrt(u), w**3 + w - 0.5 - y)
+    level, values = Level(rows, ("a", "b", "c"), ("u", "y", "w"), frozenset()), dict(u=0.0, y=0.0, w=0.0)
+    _solve(level, ("u", "y", "w"), values, {"y"}, "title")
+    assert [values["y"], values["w"] ** 3 + values["w"]] == pytest.approx([-1.5, -1.0], rel=1e-9)

@@ -351,3 +351,22 @@ def test_a_subscript_that_varies_chooses_and_none_beyond_is_taken(tmp_path):
     np.testing.assert_allclose(found.at(np.array([1.0, 2.5]), "column[2]"), [3, 2.5], atol=1e-9)
     with pytest.raises(SolveError, match="stopped at t = 3 s"):
         simulate(model, stop=4.0)
+
+
+def test_a_fixed_start_of_a_boolean_is_its_value_before_the_start(tmp_path):
+    (tmp_path / "b.mo").write_text(
+        "model B Boolean b(start=true, fixed=true), c; Real x(start=0, fixed=true);"
+        " equation b = time > 1; c = edge(b); der(x) = if b then 1 else 0; end B;"
+    )
+    found = simulate(load_modelica(tmp_path / "b.mo")["B"](), stop=2.0)
+    assert (found["b"][0], found.final("b"), found.final("x")) == (0, 1, pytest.approx(1.0, abs=1e-6))
+
+
+def test_what_remembers_sees_a_pulse_of_one_round_beside_a_when(tmp_path):
+    (tmp_path / "p.mo").write_text(
+        "model P Boolean up, pulse, y; Integer n(start=0); initial equation pre(y) = false;"
+        " equation up = time > 1; pulse = edge(up); y = pulse or pre(y);"
+        " when time > 1 then n = pre(n) + 1; end when; end P;"
+    )
+    found = simulate(load_modelica(tmp_path / "p.mo")["P"](), stop=2.0)
+    assert [found["y"][0], found.final("y"), found.final("n")] == [0, 1, 1]

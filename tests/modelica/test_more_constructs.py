@@ -311,3 +311,33 @@ def test_an_expandable_connector_has_what_is_connected_to_it(tmp_path):
     assert result.final("unit.bus.speed") == 2
     assert result.final("ground.p.v") == pytest.approx(0.5)
     assert not any("spare" in name for name in result.names)
+
+
+GUESSED = """package Guessed
+  model Lag
+    parameter Real begins = 0 "where it starts";
+    Real y(start = begins);
+  initial equation
+    y = begins;
+  equation
+    der(y) = 1 - y;
+  end Lag;
+  model Base
+    parameter Real k = 2 "in the base";
+  end Base;
+  model Whole
+    extends Base;
+    parameter Real k = 2 "the same, told otherwise";
+    parameter Real found(fixed = false);
+    Lag lag(begins = found);
+  initial equation
+    found = 2 * k;
+  end Whole;
+end Guessed;
+"""
+
+
+def test_a_guess_that_initial_equations_determine_is_left_to_them(tmp_path):
+    (tmp_path / "guessed.mo").write_text(GUESSED)
+    result = simulate(load_modelica(tmp_path / "guessed.mo")["Guessed.Whole"](), stop=1.0)
+    assert result.at(0.0, "lag.y") == pytest.approx(4)

@@ -6,7 +6,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import Input, Model, Parameter, Real, Start, cos, der, if_else, simulate, sin, time, translate
+from gantrytau import (
+    Input,
+    Model,
+    Parameter,
+    Real,
+    Start,
+    cos,
+    der,
+    exp,
+    if_else,
+    simulate,
+    sin,
+    time,
+    translate,
+)
 from gantrytau.simulation.motion import all_coordinates
 from gantrytau.simulation.state_sizes import first_sizes
 from gantrytau_models import Pendulum
@@ -118,3 +132,21 @@ def test_a_start_that_is_rounding_is_no_size(beside):
     found = simulate(dae, stop=5.0)
     np.testing.assert_allclose(found["y"], found.time * np.sin(2 * found.time) / 4, rtol=0, atol=1e-6)
     assert first_sizes(all_coordinates(dae, {})) == (1.0,) * 4
+
+
+class Fading(Model):
+    """Two nodes between conductances that fade together with what is fed in."""
+
+    g, a, b = (Real(unit="1", description=words) for words in ("conductance", "first node", "second node"))
+    x = Real(unit="s", description="integral of the first node", start=0.0, fixed=True)
+    rate = Parameter(40.0, unit="1/s", description="rate of the fading")
+
+    def equations(self) -> Any:
+        yield self.g == exp(-self.rate * time)
+        yield self.g * (2 * self.a - self.b) == self.g
+        yield self.g * (2 * self.b - self.a) == self.g
+        yield der(self.x) == self.a
+
+
+def test_equations_that_fade_as_a_whole_do_not_degenerate():
+    assert simulate(Fading(), stop=1.0).final("x") == pytest.approx(1.0, rel=1e-9)

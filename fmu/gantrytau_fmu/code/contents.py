@@ -1,7 +1,7 @@
 """The variables of an FMU, made of the formulas of a model: who they are to the outside and to the runtime."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -38,6 +38,28 @@ class Contents:
     z_nominals: tuple[float, ...]
     structure: ModelStructure
     terminals: tuple[FmuTerminal, ...]
+
+    def renamed(self, names: Mapping[str, str], units: Mapping[str, str]) -> "Contents":
+        """The same with other names of variables, and with units by these."""
+
+        def known(unknown: Unknown) -> Unknown:
+            on = unknown.dependencies and tuple(names.get(n, n) for n in unknown.dependencies)
+            return replace(unknown, name=names.get(unknown.name, unknown.name), dependencies=on)
+
+        structure = ModelStructure(
+            *(tuple(map(known, part)) for part in (self.structure.outputs, self.structure.derivatives)),
+            initial_unknowns=tuple(map(known, self.structure.initial_unknowns)),
+        )
+        return replace(
+            self,
+            variables=tuple(
+                replace(v, name=names[v.name], unit=units.get(names[v.name], "")) if v.name in names else v
+                for v in self.variables
+            ),
+            entries=tuple(replace(e, name=names.get(e.name, e.name)) for e in self.entries),
+            structure=structure,
+            terminals=(),
+        )
 
     @property
     def limited(self) -> tuple[FmuVariable, ...]:

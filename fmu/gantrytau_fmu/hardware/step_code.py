@@ -111,6 +111,7 @@ def step_code(
     period = dae.number(dae.flat.sampled[0].period)
     source = _source(function, start)
     return StepCode(
+        name=dae.name,
         given=tuple(names[0]), find=tuple(names[1]), function=function, start=start, period=period, real=real,
         header=header, source=source,
     )  # fmt: skip

@@ -17,6 +17,9 @@
 typedef struct {
     double held[GT_ROOM(GT_STEPPING)], x[GT_ROOM(GT_STATES)], m[GT_ROOM(GT_MODES)], rest[GT_ROOM(GT_FRICTIONS)], ticks[GT_ROOM(GT_CLOCKS)];
     int holds[GT_ROOM(GT_WHENS)];
+#ifdef GT_CONTROLLER
+    controller_state controller;
+#endif
 } gt_earlier;
 
 /* What a saved state holds: plain numbers, so that saving is a copy. */
@@ -47,6 +50,9 @@ typedef struct {
     int waiting;   /* samples are due that are taken with the inputs of the next step, from what was before */
     int ready;     /* the experiment is set up */
     int unsettled; /* the last event iteration asked for another one */
+#ifdef GT_CONTROLLER
+    controller_state controller; /* C of its own, whose step is what is sampled */
+#endif
 } gt_state;
 
 #if GT_DELAYS
@@ -160,6 +166,9 @@ static void gt_keep_before(gt_instance *it, int back) {
     GT_COPY(before->rest, it->now.rest, sizeof before->rest);
     GT_COPY(before->ticks, it->now.ticks, sizeof before->ticks);
     GT_COPY(before->holds, it->now.holds, sizeof before->holds);
+#ifdef GT_CONTROLLER
+    GT_COPY(&before->controller, &it->now.controller, sizeof before->controller);
+#endif
 #undef GT_COPY
     if (back) it->now.ended = 0, it->now.stale = it->outputs_stale = 1;
 }
@@ -177,6 +186,9 @@ static void gt_reset(gt_instance *it) {
     memcpy(it->now.solved_u, gt_start_u, GT_KNOWN * sizeof(double));
     memcpy(it->now.solved_z, gt_start_z, GT_ALGEBRAICS * sizeof(double));
     memcpy(it->now.m, gt_start_m, GT_MODES * sizeof(double));
+#ifdef GT_CONTROLLER
+    controller_init(&it->now.controller);
+#endif
     memset(it->beyond, 0, sizeof it->beyond);
     it->now.tolerance = GT_TOLERANCE;
     it->now.stale = 1;

@@ -58,7 +58,11 @@ static gt_status gt_sample(gt_instance *it, int *sampled) {
     it->sampling = 0;
     if (status == GT_OK) status = gt_refresh(it);
     if (status != GT_OK) return status;
+#ifdef GT_CONTROLLER
+    controller_step(&it->now.controller, it->now.u, held);
+#else
     gt_samples(it->a, held, it->w);
+#endif
     for (i = 0; i < GT_HELD_COUNT; i++)
         if (due[gt_held_clocks[i]] && !isfinite(held[i]))
             return gt_say(it, GT_ERROR, GT_LOG_ERROR, "%s: the sample of %s is not a finite number at time = %.9g s", GT_NAME,

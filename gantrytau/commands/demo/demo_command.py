@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -36,6 +36,9 @@ ACCURACY = 1e-3  # relative, to which motions are refined: limits hold between t
 
 def demo(
     output: Annotated[Path, typer.Option(help="Folder for pictures and trajectories.")] = Path("demo-output"),
+    friction: Annotated[
+        Literal["tanh", "linear"], typer.Option(help="How the sign of a speed is smoothed in friction.")
+    ] = "tanh",
     json: Json = False,
 ) -> None:
     """Solve the minimum-time motions of thesis Table 3.1, and one of a robot with six links; draw them."""
@@ -51,7 +54,7 @@ def demo(
         screen.print(f"Cannot write into {output}: {error.strerror}; name another folder with --output")
         raise typer.Exit(MISUSE) from None
     try:
-        optima, seconds = _solve(screen)
+        optima, seconds = _solve(screen, friction)
     except SolveError as error:
         screen.print(str(error), markup=False)
         if error.optimum is not None:
@@ -101,16 +104,23 @@ def save_trajectory(optimum: "Optimum", file: Path) -> None:
     optimum.result.select(["robot.tool.r", "robot.tool.v", *carts, *torques]).save(file)
 
 
-def _solve(screen: "Console") -> "tuple[dict[str, Optimum], dict[str, float]]":
+def _solve(screen: "Console", friction: str) -> "tuple[dict[str, Optimum], dict[str, float]]":
     """All motions, with progress on the screen, and the seconds that each took."""
-    from gantrytau.commands.demo.motion_problems import FreePath, OnLine, SixLinks
+    from gantrytau.commands.demo.motion_problems import FreePath, OnLine, SixLinks, robots
     from gantrytau_optimica import optimize
 
+    free, line, six = ({"robot": robot} for robot in robots(friction))
     motions: list[tuple[str, str, Any, dict[str, Any]]] = [
-        (row.key, row.title, (OnLine if row.line else FreePath)(weight=row.weight), {}) for row in ROWS
+        (
+            row.key,
+            row.title,
+            OnLine(weight=row.weight, **line) if row.line else FreePath(weight=row.weight, **free),
+            {},
+        )
+        for row in ROWS
     ]
-    motions.append((BRANCH, BRANCH_TITLE, FreePath, {"starts": STARTS}))
-    motions.append((SIX_LINK, SIX_LINK_TITLE, SixLinks, {"elements": 20}))
+    motions.append((BRANCH, BRANCH_TITLE, FreePath(**free), {"starts": STARTS}))
+    motions.append((SIX_LINK, SIX_LINK_TITLE, SixLinks(**six), {"elements": 20}))
     optima: dict[str, Optimum] = {}
     seconds: dict[str, float] = {}
     with screen.status("translating the robot") as status:

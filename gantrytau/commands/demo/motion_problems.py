@@ -1,6 +1,7 @@
 """The minimum-time motions of thesis Table 3.1, and one of the robot with six links, as problems."""
 
 from gantrytau import Input, Parameter, Real, between
+from gantrytau.mechanics import LinearFriction, TanhFriction
 from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial
 
@@ -71,3 +72,13 @@ class SixLinks(Optimization):
         yield final(self.robot.tool.r) == SIX_LINK_END
         yield initial(self.robot.tool.v) == 0
         yield final(self.robot.tool.v) == 0
+
+
+def robots(friction: str) -> tuple[GantryTau, RobotOnLine, SixLinkGantryTau]:
+    """The robots of the three problems with a law of friction: "tanh", or piecewise "linear" as the thesis has it."""
+    law = {"tanh": TanhFriction, "linear": LinearFriction}[friction]
+    return (
+        GantryTau(prototypes.GT_A, friction=law),
+        RobotOnLine(prototypes.GT_A, friction=law),
+        SixLinkGantryTau(prototypes.D1, friction=law),
+    )

@@ -172,7 +172,7 @@ def _solve(
     def at(point: np.ndarray) -> tuple[np.ndarray, Matrix]:
         around[columns] = point
         f, nonzeros = level.look(around)
-        return f, matrix(nonzeros)
+        return f, matrix(np.where(np.isfinite(nonzeros), nonzeros, 0.0))  # sqrt(u) at u = 0 says nothing of u
 
     if propagate:
         missing = {column for k, column in enumerate(columns) if moving[k] not in started}

@@ -1,5 +1,6 @@
 """Start values of all symbols: what the model gives, made consistent level by level."""
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from gantrytau.compiler.start.level import Level
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel
+from gantrytau.language.scalar_arithmetic import leaf_names
 
 ROUNDS = 200  # in which delayed values are made those of the start
 SAME = 1e-13  # relative, between two rounds
@@ -63,33 +65,39 @@ def _consistent_start(
         last = stages[-1]
         stages[-1] = Level(last.residuals, last.names, (*last.unknowns, *free), last.exact)
     title, fixed = flat.name, guess.fixed | held
-    started, thorough = guess.started | held, not held
-    try:
+    started = guess.started | held
+    initial = bool(flat.initial_equations) and not held
+    if initial and free not in indexed.with_initial:
+        indexed.with_initial[free] = _initial_level(flat, reduced, stages)
+
+    def led(levels: list[Level], chosen: frozenset[str], thorough: bool = False) -> dict[str, float]:
+        """Solve the levels, and then all of them with the initial equations."""
         values = solve_levels(
-            stages,
+            levels,
             guess.values,
             held=fixed,
             started=started,
-            chosen=guess.chosen,
+            chosen=chosen,
             title=title,
             thorough=thorough,
         )
+        whole = [indexed.with_initial[free]] if initial else []
+        return solve_levels(whole, values, held=fixed, started=guess.started, title=title)
+
+    try:
+        return led(stages, guess.chosen, not held)
     except InitializationError as error:
         refuse_outside(flat, reduced, guess.values, error)
-        if held or not guess.fixed:
+        if held or not (guess.fixed or initial):
             raise
-        # a fixed start may belong to a later level than the states that have to follow it
-        try:
-            values = solve_levels([indexed.whole], guess.values, held=fixed, started=started, title=title)
-        except InitializationError:
-            raise _with_nearest(error, stages, guess, started, title) from None
-    if flat.initial_equations and not held:
-        if free not in indexed.with_initial:
-            indexed.with_initial[free] = _initial_level(flat, reduced, stages)
-        values = solve_levels(
-            [indexed.with_initial[free]], values, held=fixed, started=guess.started, title=title
-        )
-    return values
+        # equations may have no value before the initial ones hold, a fixed start belong to a later level than the states
+        # that follow it, and an initial equation to the first level
+        attempts = [[]] if initial else []
+        attempts += [[indexed.whole], *([_with_initial(flat, reduced, stages)] if initial else [])]
+        for levels in attempts:
+            with contextlib.suppress(InitializationError):
+                return led(levels, frozenset())
+        raise (_with_nearest(error, stages, guess, started, title) if guess.fixed else error) from None
 
 
 def _with_nearest(
@@ -121,6 +129,17 @@ def refuse_outside(
                 "within, add points, or let it go on with outside='hold' or 'linear'"
             )
             raise InitializationError(words, place=flat.name, residuals=error.residuals) from None
+
+
+def _with_initial(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> list[Level]:
+    """The levels, the first one with the initial equations in which no unknown of another level stands."""
+    first, *others = stages
+    later = {n for s in others for n in s.unknowns}
+    rows = reduced.to_reduced(ca.vertcat(*(e.residual for e in flat.initial_equations))).elements()
+    own = [k for k, row in enumerate(rows) if later.isdisjoint(leaf_names([row]))]
+    names = tuple(f"initial equation of {flat.initial_equations[k].name}" for k in own)
+    residuals = (*first.residuals, *(rows[k] for k in own))
+    return [Level(residuals, (*first.names, *names), first.unknowns, first.exact), *others]
 
 
 def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:

@@ -13,7 +13,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import Items, joined_whens, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
-from gantrytau.modelica.elaboration.kinds import fits, type_of, type_of_value
+from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import action_of, looped
@@ -137,7 +137,7 @@ class Execution:
         wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
         if not fits(wanted, kind := type_of_value(value)):
             raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
-        if not any(isinstance(one, tree.Mark) for one in sizes) and not _is_array_type(element):
+        if not any(isinstance(one, tree.Mark) for one in sizes) and not is_array_type(element):
             self.shapes[name] = tuple(reader.value(one) for one in sizes)
             if value is not None:
                 self._check_shape(name, value)
@@ -272,9 +272,9 @@ def called_class(
     whole = definition.kind == "record"
     inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
-    mapped = next((n for n, one in given.items() if not record and _is_longer(inputs[n], one)), None)
+    mapped = next((n for n, one in given.items() if not record and is_longer(inputs[n], one)), None)
     if mapped is not None:
-        longer = {n for n, one in given.items() if _is_longer(inputs[n], one)}
+        longer = {n for n, one in given.items() if is_longer(inputs[n], one)}
         count = range(len(given[mapped]))
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, known) for one in all_given]
@@ -323,29 +323,6 @@ def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution
 
 def _is_open(value: Any) -> bool:
     return value is None or (isinstance(value, np.ndarray) and any(one is None for one in value.flat))
-
-
-def _dimensions(element: Element) -> int:
-    return len(element.declaration.subscripts) + len(element.clause.subscripts)
-
-
-def _is_longer(element: Element, value: Any) -> bool:
-    """Whether a function of scalars is given an array, of which it takes each element."""
-    return (
-        isinstance(value, np.ndarray)
-        and value.ndim == _dimensions(element) + 1
-        and not _is_array_type(element)
-    )
-
-
-def _is_array_type(element: Element) -> bool:
-    here: ClassScope | None = element.scope.find_class(element.clause.type, element.clause.at)
-    while here is not None and here.is_primitive:
-        body = here.definition.body
-        if isinstance(body, tree.ShortClass) and body.subscripts:
-            return True
-        here = here.bases[0][0] if here.bases else None
-    return False
 
 
 def _given(

@@ -18,7 +18,14 @@ from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
 from gantrytau.modelica.records.operators import operated
 from gantrytau.modelica.records.record_values import RecordValue
-from gantrytau.modelica.references import Members, called_function, component_of, function_name, whole_name
+from gantrytau.modelica.references import (
+    Members,
+    called_function,
+    component_of,
+    declared_shape,
+    function_name,
+    whole_name,
+)
 
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
@@ -325,19 +332,18 @@ class Interpreter:
             if name == "array":
                 return values.array(items)
             return values.called(name, [np.ravel(values.array(items))], {})
-        if name == "size" and e.arguments and (shape := self._declared_shape(e.arguments[0])) is not None:
+        if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
             return values.called(name, [inner.value(one) for one in e.arguments], {})
-        if name == "sample":
-            return time >= self.members.next_sample(e)
+        if name in ("sample", "initial"):
+            instant = self.members.next_sample(e)
+            return time >= instant if name == "sample" else instant > 0.5
         if name == "getInstanceName":
             return self.members.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
-        if name == "initial":
-            return self.members.next_sample(e) > 0.5
         if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = called_function(e, self)
@@ -366,15 +372,6 @@ class Interpreter:
             return old
         test = changed if asked == "change" else lambda a, b: a > b + 0.5
         return np.frompyfunc(test, 2, 1)(new, old) if isinstance(new, np.ndarray) else test(new, old)
-
-    def _declared_shape(self, e: tree.Expression) -> tuple[int, ...] | None:
-        """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
-        if not isinstance(e, tree.ComponentReference):
-            return None
-        (name, subscripts), *rest = e.parts
-        if rest or subscripts:
-            return None
-        return self.members.shape(name) if name not in self.local and self.members.has(name) else None
 
     def _partial(self, e: tree.PartialCall) -> Any:
         raise ModelError("found a function as an argument, which is not supported, expected a value")

@@ -7,6 +7,7 @@ import numpy as np
 
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter
+from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
 from gantrytau.modelica.references import called_function
 
@@ -130,3 +131,27 @@ def check_type(wanted: str, expression: Any, reader: Interpreter, what: str, at:
     if not fits(wanted, found):
         remedy = "; integer() makes it whole" if (wanted, found) == ("Integer", "Real") else ""
         reader.scope.refuse(at, f"found {found} for {what}, expected {wanted}{remedy}")
+
+
+def _dimensions(element: Element) -> int:
+    return len(element.declaration.subscripts) + len(element.clause.subscripts)
+
+
+def is_longer(element: Element, value: Any) -> bool:
+    """Whether a function of scalars is given an array, of which it takes each element."""
+    return (
+        isinstance(value, np.ndarray)
+        and value.ndim == _dimensions(element) + 1
+        and not is_array_type(element)
+    )
+
+
+def is_array_type(element: Element) -> bool:
+    """Whether the type of a variable of a function has sizes of its own."""
+    here: ClassScope | None = element.scope.find_class(element.clause.type, element.clause.at)
+    while here is not None and here.is_primitive:
+        body = here.definition.body
+        if isinstance(body, tree.ShortClass) and body.subscripts:
+            return True
+        here = here.bases[0][0] if here.bases else None
+    return False

@@ -24,7 +24,7 @@ from gantrytau.modelica.elaboration.kinds import check_type
 from gantrytau.modelica.elaboration.modifiers import Modifier
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
-from gantrytau.modelica.overdetermined.records import is_propagated, propagated_quantity
+from gantrytau.modelica.overdetermined.records import is_overdetermined, is_propagated, propagated_quantity
 from gantrytau.modelica.references import nodes_of, references
 
 KINDS = {"flow": Flow, "input": Input, "output": Output}
@@ -79,6 +79,7 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     elif kind is Input and inside_optimization(structure):
         kind = Real  # which the equations around it determine
     found: Quantity = kind(one.shape, **words, prefer=said.get("prefer", StateSelect.DEFAULT))
+    found.inlined = kind is Real and is_overdetermined(structure)  # type: ignore[attr-defined]
     if "value" in said:
         found.value = said["value"]  # type: ignore[attr-defined]
     body[name] = found
@@ -110,6 +111,8 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     for name, attribute in said.inner.items():
         if attribute.value is None or name in IGNORED:
             continue
+        if name == "start" and "fixed" not in said.inner and _is_solved(structure, attribute.value):
+            continue  # a guess that is known after the start only
         if name in NUMBERS and not structure.is_fixed(attribute.value):
             words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
             attribute.scope.refuse(attribute.at, words)
@@ -128,7 +131,9 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             if len(each) > 1:
                 words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
                 attribute.scope.refuse(attribute.at, words)
-            found[name] = bool(each.pop())
+            # of Booleans and Integers it says pre(b) = start, not b = start (chapter 8.6)
+            if one.is_parameter or one.kind == "Real" or name == "free":
+                found[name] = bool(each.pop())
         elif name == "stateSelect":
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:
@@ -142,6 +147,12 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     if "display" in found and not _displayed(found["display"], found.get("unit")):
         del found["display"]
     return found
+
+
+def _is_solved(structure: Structure, value: Any) -> bool:
+    """Whether an expression depends on parameters that initial equations determine, and on no variable."""
+    leaves = [structure.leaf(one) for one in references(value) if not structure.is_fixed(one)]
+    return bool(leaves) and all(one is not None and (one.is_solved or one.follows) for one in leaves)
 
 
 def _has_dimension(unit: str) -> bool:

@@ -12,6 +12,7 @@ from gantrytau.language.declarations import Discrete
 from gantrytau.language.events import Happening, WhenChain, reinit, terminate
 from gantrytau.language.functions import if_else, logic_and, logic_not
 from gantrytau.language.statements import connect, require
+from gantrytau.language.symbols import of_parameters
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import (
     BEFORE,
@@ -83,10 +84,11 @@ def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenC
     left = cast(tree.ComponentReference, item.left)
     taken, turn = reader.members.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
     now = sides(item, replace(reader, settled=True))
+    waits = not remembers(item, reader.members)  # else a pulse of one round would have passed
     for (variable, right), (_, settled) in zip(sides(item, reader), now, strict=True):
         if taken is None:
             chain = follows(settled, variable, turn, right)
-            yield WhenChain(tuple(replace(one, waits=True) for one in chain.branches))
+            yield WhenChain(tuple(replace(one, waits=waits) for one in chain.branches))
             continue
         if reader.members.type_of(left) == "Boolean":
             test = values.condition(right)
@@ -94,7 +96,7 @@ def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenC
         else:
             tests = [logic_and(right > k - 0.5, right < k + 0.5) for k in taken]
         acts = zip(taken, tests, strict=True)
-        yield WhenChain(tuple(Happening(t, (variable == k,), initially=True, waits=True) for k, t in acts))
+        yield WhenChain(tuple(Happening(t, (variable == k,), initially=True, waits=waits) for k, t in acts))
 
 
 def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tree.SimpleEquation]:
@@ -273,7 +275,8 @@ def _call(item: tree.ProcedureCall, reader: Interpreter, where: Any = True) -> I
     if where is not True:
         holds = values.binary("or", values.unary("not", where), values.condition(holds))
     if isinstance(holds, ca.SX):
-        if where is True and reader.members.is_fixed(arguments["condition"]):
+        words = words or "an assertion does not hold"
+        if where is True and of_parameters(holds):
             yield require(holds, words)
         else:
             yield WhenChain((Happening(logic_not(values.condition(holds)), (), words, True, words),))

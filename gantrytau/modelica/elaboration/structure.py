@@ -20,7 +20,7 @@ from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
 from gantrytau.modelica.references import references
-from gantrytau.modelica.shaping import ask, ask_for_shapes
+from gantrytau.modelica.shaping import ask, ask_for_shapes, is_known
 
 
 @dataclass(eq=False)
@@ -161,14 +161,7 @@ class Structure:
         return None if low is None or high is None else range(int(low), int(high) + 1)
 
     def is_fixed(self, expression: Any) -> bool:
-        return all(map(self.is_known, references(expression)))
-
-    def is_known(self, reference: tree.ComponentReference) -> bool:
-        """Whether a reference leads to a parameter or constant."""
-        if not self.has(reference.parts[0][0]):
-            return reference.parts[0][0] != "time"
-        one = self.leaf(reference)
-        return one is None or one.is_parameter
+        return all(is_known(self, one) for one in references(expression))
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""

@@ -17,7 +17,13 @@ def is_propagated(structure: Any) -> bool:
     """Whether an instance is a record of a connector that is passed on along the spanning tree."""
     around = structure.around
     inside = around is not None and around.scope.definition.kind == "connector"
-    return inside and structure.scope.inherited_class("equalityConstraint") is not None
+    return inside and is_overdetermined(structure)
+
+
+def is_overdetermined(structure: Any) -> bool:
+    """Whether an instance is a record with a function `equalityConstraint`."""
+    scope = structure.scope
+    return scope.definition.kind == "record" and scope.inherited_class("equalityConstraint") is not None
 
 
 def is_drawn(scope: Any) -> bool:

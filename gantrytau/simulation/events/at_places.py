@@ -58,6 +58,14 @@ class AtPlaces:
                     first = last
         return found
 
+    def compiled(self) -> bool:
+        """Wait for the kernel; whether it is there."""
+        with self._lock:
+            there = self._kernel is not None and self._kernel.wait()
+            if there:
+                self._memories.clear()
+            return there
+
     def _fill(
         self, size: int, firsts: range, rows: Sequence[np.ndarray | float], found: list[np.ndarray]
     ) -> None:

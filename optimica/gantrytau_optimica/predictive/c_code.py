@@ -1,6 +1,6 @@
 """A predictive controller as C: `controller.h` and `controller.c` of its numbers, its stage function and a template."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,29 +19,33 @@ TEMPLATES = Path(__file__).parent
 TURNS = 60  # of the interior-point method, at most; 10 to 25 are usual
 CLOSE, GOOD = 1e-14, 1e-9  # of products of slacks and multipliers: where it ends, and what is a solution
 KEPT = 1e-11  # of limits, in sizes
-YIELD = (
-    1e-10  # of limits by their multipliers: of 1e-9 to 1e-13 the nearest to PIQP on ill-conditioned programs
-)
+YIELD = 1e-10  # of limits by their multipliers: among 1e-9 to 1e-13 what ill-conditioned programs bear best
 
 
 def controller_code(
-    mpc: Any, soft: np.ndarray, penalty: float, first: PlannedMotion, limits: tuple[int, int, float]
+    mpc: Any,
+    soft: np.ndarray,
+    penalty: float,
+    first: PlannedMotion,
+    limits: tuple[int, int, float],
+    estimates: Mapping[str, float],
 ) -> SampledCode:
     """C of an Mpc. soft (rows,): which limits give way; first: plan, NaN for measured states; limits: most iterations of the
-    first plan and of a step, and changes by which they are done.
+    first plan and of a step, and changes by which they are done; estimates: name -> value until one is given.
 
     ModelError for courses, which are functions of Python, and for a steady state that moves.
     """
     stages: HorizonStages = mpc.stages
-    if stages.phase.courses:
-        names = ", ".join(course.name for course in stages.phase.courses)
+    known = [course.name for course in stages.phase.courses]
+    if set(known) - set(estimates):
+        names = ", ".join(name for name in known if name not in estimates)
         raise ModelError(
             f"{names}: a course is a function of Python, expected formulas of time for C; write it into the model",
             place=mpc.name,
         )
     rows = _rows(mpc, soft)
     sizes = dict(
-        PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size,
+        PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size, NK=len(known),
         NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.any()),
         END=int(mpc.terminal.there), DELAY=mpc.delay, PENALTY=float(penalty), RIDGE=RIDGE,
         TURNS=TURNS, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
@@ -55,26 +59,32 @@ def controller_code(
         "@PERIODS@": f"{mpc.elements} periods",
         "@FIRST@": str(limits[0]),
         "@ITERATIONS@": "one" if limits[1] == 1 else f"up to {limits[1]}",
-        "@GIVEN@": str(stages.nx),
+        "@GIVEN@": str(stages.nx + len(known)),
         "@FOUND@": str(stages.nu),
-        "@GIVEN_NAMES@": ", ".join(mpc.states),
+        "@GIVEN_NAMES@": ", ".join((*mpc.states, *known)),
         "@FOUND_NAMES@": ", ".join(mpc.inputs),
         "@SIZES@": "\n".join(f"#define MPC_{name} {value!r}" for name, value in sizes.items()),
         "@POINT@": c_source(point, name="mpc_point").rstrip("\n"),
-        "@TABLES@": "\n".join(_tables(mpc, rows, first)),
+        "@TABLES@": "\n".join(
+            [*_tables(mpc, rows, first), _numbers("mpc_known", [estimates[n] for n in known])]
+        ),
     }
-    texts = []
-    for name in ("controller.h", "controller.c"):
-        text = (TEMPLATES / name).read_text(encoding="utf-8")
-        for word, value in told.items():
-            text = text.replace(word, value)
-        texts.append(text)
+    header, source = (_filled(name, told) for name in ("controller.h", "controller.c"))
     flat = mpc.built.read.dae.flat
-    units = {n: v.unit for v in flat.variables for n in v.elements if v.unit}
-    own = {n: units[n] for n in (*mpc.states, *mpc.inputs) if n in units}
+    own = {*mpc.states, *mpc.inputs}
+    units = {n: v.unit for v in flat.variables for n in v.elements if v.unit and n in own}
     return SampledCode(
-        given=mpc.states, find=mpc.inputs, period=mpc.period, units=own, header=texts[0], source=texts[1]
-    )
+        name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, header=header,
+        source=source,
+    )  # fmt: skip
+
+
+def _filled(name: str, told: Mapping[str, str]) -> str:
+    """A template with its words replaced."""
+    text = (TEMPLATES / name).read_text(encoding="utf-8")
+    for word, value in told.items():
+        text = text.replace(word, value)
+    return text
 
 
 def stage_point(stages: HorizonStages, terminal: Terminal) -> ca.Function:
@@ -83,7 +93,7 @@ def stage_point(stages: HorizonStages, terminal: Terminal) -> ca.Function:
     found = stages.point(y, t, courses)
     if terminal.there:
         found = [*found, *terminal.derivatives(y, t, courses)]
-    return ca.Function("mpc_point", [y, t], [ca.densify(one) for one in found], {"cse": True})
+    return ca.Function("mpc_point", [y, t, courses], [ca.densify(one) for one in found], {"cse": True})
 
 
 def _rows(mpc: Any, soft: np.ndarray) -> list[str]:
@@ -144,12 +154,12 @@ def _rest(steady: SteadyState | None, stages: HorizonStages) -> tuple[np.ndarray
     return steady.at(0.0, start)
 
 
-def _numbers(name: str, values: np.ndarray, columns: str = "") -> str:
+def _numbers(name: str, values: Any, columns: str = "") -> str:
     """A table row by row, with NAN for what is not known."""
     words = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
 
-    def row(numbers: np.ndarray) -> str:
-        return "{" + ", ".join(words.get(repr(float(v)), repr(float(v))) for v in numbers) + "}"
+    def row(numbers: Iterable[float]) -> str:
+        return "{" + (", ".join(words.get(repr(float(v)), repr(float(v))) for v in numbers) or "0") + "}"
 
     inside = row(values) if not columns else "{" + ", ".join(row(one) for one in values) + "}"
     return f"static const double {name}[]{columns} = {inside};"

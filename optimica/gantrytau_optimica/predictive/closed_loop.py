@@ -24,7 +24,7 @@ class ClosedLoop(Record):
 
     result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
     its steps; cost: the integral of the problem's integrand along the motion; estimates: what an estimator gave at each
-    sample but the last, by name.
+    sample but the last, by name; parameters: of the plant.
     """
 
     result: Result
@@ -32,6 +32,7 @@ class ClosedLoop(Record):
     timing: StepTimes
     cost: float
     estimates: Mapping[str, np.ndarray] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.result[name]
@@ -101,7 +102,8 @@ def closed_loop(
         inputs.append(u)
     motion = PlannedMotion(np.array(states), np.array(unknowns), np.array(inputs), 0.0)
     found = motion_result(built, stages, motion, mpc.period, f"{mpc.name}, closed loop")
-    return ClosedLoop(found, tuple(statuses), mpc.timing, cost, sensors.estimates)
+    parameters = dict(built.read.dae.parameter_values)
+    return ClosedLoop(found, tuple(statuses), mpc.timing, cost, sensors.estimates, parameters)
 
 
 class _Sensors:

@@ -124,19 +124,20 @@ static void mpc_cost(double weight, const double T[NY][1 + NV], int n, const int
 
 #define J(i, j) jacobian[(i) + (NX + NZ) * (j)] /* of the equations of a point by its signals */
 
-/* A stage that begins at time t linearised at x, w, u; 0 where its equations are singular. See HorizonStages.linear. */
-static int mpc_linearise(const double *x, const double *w, const double *u, double t, mpc_linear *to) {
+/* A stage that begins at time t linearised at x, w, u, with the estimates that are known; 0 where its equations are singular. See HorizonStages.linear. */
+static int mpc_linearise(const double *x, const double *w, const double *u, double t, const double *known,
+                         mpc_linear *to) {
     double y[2][NY], e[2][NX + NZ], jacobian[(NX + NZ) * NY], gradient[2][NY], curved[2][ROOM(NC * NC)];
     double rows[ROOM(NL)], slopes[ROOM(NL) * NY], end_g[NY], end_H[ROOM(MPC_END * NY * NY)], z[2][ROOM(NZ)][1 + NV], limits[2][ROOM(NL)][1 + NY];
     double left[2 * NX][2 * NX], moved[2 * NX][1 + NV], f[2][NX][1 + NV];
     int i, j, k, p, q;
     FOR(p, 2) {
         double at = t + MPC_PERIOD * mpc_nodes[p], A[ROOM(NZ * NZ)];
-        const double *given[2];
+        const double *given[3];
         double *found[8], unused[ROOM(MPC_WORK)];
         memcpy(y[p], w + p * (NX + NZ), (NX + NZ) * sizeof(double));
         memcpy(y[p] + NX + NZ, u, NU * sizeof(double));
-        given[0] = y[p], given[1] = &at;
+        given[0] = y[p], given[1] = &at, given[2] = known;
         found[0] = e[p], found[1] = jacobian, found[2] = gradient[p], found[3] = curved[p], found[4] = rows, found[5] = slopes;
         found[6] = end_g, found[7] = end_H;
         if (mpc_point(given, found, NULL, unused, 0)) return 0;
@@ -472,7 +473,7 @@ static int mpc_later(controller_state *it, double *x, double t) {
     int i, turn;
     memcpy(w, it->plan.w[0], sizeof w);
     FOR(turn, 12) if (!(change < 1e-10)) {
-        if (!mpc_linearise(x, w, it->applied, t, &linear)) return 0;
+        if (!mpc_linearise(x, w, it->applied, t, it->known, &linear)) return 0;
         change = 0;
         FOR(i, NW) {
             const double by = linear.T[i / (NX + NZ)][i % (NX + NZ)][0];
@@ -492,7 +493,7 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
     int i, j, k, m;
     FOR(k, N) {
         FOR(i, NU) o[i] = (k ? it->plan.u[k - 1][i] : it->applied[i]) - it->plan.u[k][i];
-        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, &work->linear)) return -1;
+        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, it->known, &work->linear)) return -1;
         FOR(i, NW) FOR(j, 1 + NV) work->unknowns[k][i][j] = work->linear.T[i / (NX + NZ)][i % (NX + NZ)][j];
         mpc_assemble(&work->stages[k], k, &work->linear, it->plan.w[k] + NX + NZ, it->plan.x[k + 1], it->plan.u[k], o);
     }
@@ -524,6 +525,7 @@ void controller_init(controller_state *state) {
     int i;
     memset(state, 0, sizeof *state);
     FOR(i, NU) state->applied[i] = mpc_clip(0, mpc_lower_u[i], mpc_upper_u[i]);
+    FOR(i, MPC_NK) state->known[i] = mpc_known[i];
     state->ready = 1;
 }
 
@@ -538,6 +540,7 @@ void controller_step(controller_state *state, const controller_real *given, cont
         x[i] = given[i] / mpc_sizes_x[i];
         if (!isfinite(x[i])) it->lost = 1, x[i] = begun ? it->plan.x[MPC_DELAY ? 0 : 1][i] : 0;
     }
+    FOR(i, MPC_NK) if (isfinite(given[NX + i])) it->known[i] = given[NX + i];
     if (it->lost && !begun) solved = 0; /* there is nothing to foretell from */
     if (!begun) mpc_guess(it, x);
     if (MPC_DELAY && solved) solved = mpc_later(it, x, t), t += MPC_PERIOD;

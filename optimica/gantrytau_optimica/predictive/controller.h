@@ -11,7 +11,7 @@ typedef double controller_real;
 #define CONTROLLER_FOUND @FOUND@ /* @FOUND_NAMES@ */
 
 @SIZES@
-/* N periods; NX, NZ, NU: states, algebraics and inputs; NL, NI: limits along the path, and of a stage of the program */
+/* N periods; NX, NZ, NU: states, algebraics and inputs; NK: estimates; NL, NI: limits along the path, and of a stage of the program */
 #define MPC_NY (MPC_NX + MPC_NZ + MPC_NU) /* signals of a point */
 #define MPC_NW (2 * (MPC_NX + MPC_NZ)) /* unknowns of a stage: states and algebraics at its two points */
 #define MPC_NV (MPC_NX + MPC_NU)
@@ -43,7 +43,7 @@ typedef struct { double x[MPC_N + 1][MPC_NX], w[MPC_N][MPC_NW], u[MPC_N][MPC_NU]
 
 typedef struct {
     mpc_plan plan, before;
-    double applied[MPC_NU];
+    double applied[MPC_NU], known[MPC_ROOM(MPC_NK)];
     int ready, begun, steps; /* steps: until now, of which each is a period of time */
     int lost, failed;        /* the last step: a measurement was not finite; there was no solution, the plan before holds */
     mpc_work work;

@@ -81,9 +81,10 @@ class HorizonProgram:
         self._dynamics = _Pattern([beside] * n, nx, each)
         self._limits = _Pattern([np.ones((self.rows, each), bool)] * n, self.rows, each, n * each + nx)
         self._solver: Any = None
+        self._ends = np.zeros(0), np.zeros(0)  # lower and upper ones of all variables
 
-    def solve(self, stage: Stage, P: np.ndarray, p: np.ndarray, first: np.ndarray) -> Found:
-        """Changes that solve it. P, p: of the last state; first (nx,): the change of the first one, which is known."""
+    def load(self, stage: Stage, P: np.ndarray, p: np.ndarray) -> None:
+        """Hand the solver all but the first state. P, p: of the last one."""
         n, nx, nu, each, slack = self.stages, self.nx, self.nu, self.each, self.slack
         ridge = self.ridge * max(
             float(np.abs(stage.H).max(initial=0.0)), float(np.abs(P).max(initial=0.0)), 1e-300
@@ -103,17 +104,18 @@ class HorizonProgram:
         high[:, last:first_above], low[:, first_above:] = FAR, FAR
         lower, upper = np.full((2, n, each), FAR)
         lower[:, nx : nx + nu], upper[:, nx : nx + nu] = -stage.lower_u, stage.upper_u
-        lower[0, :nx], upper[0, :nx] = -first, first
+        lower[0, :nx] = upper[0, :nx] = 0.0
         if slack:
             H[:, -1, -1] = g[:, -1] = self.penalty
             G[:, last:first_above, -1], G[:, first_above:, -1] = 1.0, -1.0
             lower[:, -1] = 0.0
         free = np.full(nx, FAR)
+        self._ends = -np.append(lower.ravel(), free), np.append(upper.ravel(), free)
         terms = (
             self._hessian.filled([H.ravel(), (P + ridge * np.eye(nx)).ravel()]), np.append(g.ravel(), p),
             self._dynamics.filled([M.ravel()]), -stage.b.ravel(),
             self._limits.filled([G.ravel()]), -np.minimum(low, FAR).ravel(), np.minimum(high, FAR).ravel(),
-            -np.append(lower.ravel(), free), np.append(upper.ravel(), free),
+            *self._ends,
         )  # fmt: skip
         if self._solver is None:
             self._solver = piqp.SparseSolver()
@@ -124,7 +126,16 @@ class HorizonProgram:
             ) = ACCURACY
             self._solver.setup(*terms)
         else:
+            self._solver.settings.preconditioner_reuse_on_update = False
             self._solver.update(*terms)
+
+    def solve(self, first: np.ndarray) -> Found:
+        """Changes that solve what is loaded. first (nx,): the change of the first state, which is known."""
+        n, nx, nu, each = self.stages, self.nx, self.nu, self.each
+        for end in self._ends:
+            end[:nx] = first
+        self._solver.settings.preconditioner_reuse_on_update = True  # its matrices are as they were
+        self._solver.update(x_l=self._ends[0], x_u=self._ends[1])
         status = self._solver.solve()
         v = np.array(self._solver.result.x)
         parts = v[: n * each].reshape(n, each)
@@ -132,7 +143,7 @@ class HorizonProgram:
         return Found(
             x,
             parts[:, nx : nx + nu],
-            parts[:, -1] if slack else np.zeros(n),
+            parts[:, -1] if self.slack else np.zeros(n),
             bool(status == piqp.Status.PIQP_SOLVED and np.isfinite(v).all()),
             status == piqp.Status.PIQP_DUAL_INFEASIBLE,
         )

@@ -3,6 +3,8 @@
 import math
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -12,15 +14,10 @@ from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import instance, number, one_of, whole
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
+from gantrytau_optimica.predictive import horizon_checks as checks
 from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
-from gantrytau_optimica.predictive.horizon_checks import (
-    check_bounded,
-    check_plan,
-    doubt_deadline,
-    doubt_samples,
-)
 from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
@@ -36,7 +33,7 @@ from gantrytau_optimica.predictive.unknowns import as_courses, named_values, wit
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
-STANDS = 1e-9  # changes of scaled variables by which iterations are done
+STANDS = 1e-6  # changes of scaled inputs by which iterations are done; flat parts of a program are not solved better
 PENALTY = 1e3  # times the largest curvature of the objective
 MOST = 50  # iterations of the first plan, and of `converged`
 
@@ -56,11 +53,9 @@ class Mpc:
     then.
     deadline: s, of a step: if it takes longer, the inputs are those of the plan before, and `.status` says "late".
     disturbance, parameters: names of inputs or outputs with a constant disturbance, and of parameters, whose estimates
-    `step` takes beside the state. There is no offset if as many disturbances are estimated as outputs are measured and the
-    objective is least at the set point (Pannocchia, Rawlings, 2003).
-    rates: input -> largest rate in its unit/s, or (lowest, highest); steps are counted from the input applied last, at first
-    from 0. step_penalty: input -> weight of the squares of its steps. blocks: periods for which the plan holds inputs, as 2,
-    or [1, 1, 2, 4], the last one to the end.
+    `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
+    disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
+    2003).
     guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
@@ -98,9 +93,10 @@ class Mpc:
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
         self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
-        check_bounded(self.stages)
-        doubt_samples(self.built, self.period)
+        checks.check_bounded(self.stages)
+        checks.doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self.stages.curvature if penalty is None else penalty
         finite = np.isfinite(self.stages.rows)
@@ -114,7 +110,7 @@ class Mpc:
         self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._guess = guess
         self._plan: PlannedMotion | None = None
-        self._prepared: tuple[float, Linear] | None = None
+        self._prepared: tuple[PlannedMotion, Linear | None] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
         self._missed = 0
@@ -126,12 +122,12 @@ class Mpc:
         counts = f"{self.stages.nx} states, {self.stages.nu} inputs"
         return f"<Mpc {self.name}: {self.elements} periods of {self.period:g} s, {counts}>"
 
-    @property
+    @cached_property
     def states(self) -> tuple[str, ...]:
         """Names of the states, all of which `step` wants."""
         return tuple(s.name for s in self.stages.phase.states)
 
-    @property
+    @cached_property
     def inputs(self) -> tuple[str, ...]:
         """Names of the inputs that `step` gives."""
         return tuple(s.name for s in self.stages.phase.inputs)
@@ -184,22 +180,39 @@ class Mpc:
         }
         self.status = next(word for word, holds in words.items() if holds)
         self._steps.append(time.perf_counter() - begin)
-        doubt_deadline(self.name, self.deadline, self._steps, self._missed)
+        checks.doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
-        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs."""
-        first, change = self._plan is None, math.inf
-        plan = self._first(x, t) if self._plan is None else self._plan.shifted(t, self.period)
+        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs.
+
+        A plan that cannot go on, or is no motion of the model, is made anew as the first one.
+        """
         prepared, self._prepared = self._prepared, None
-        for k in range(MOST if first else self.iterations):
-            if k == 0 and prepared is not None and abs(prepared[0] - t) < 1e-9 * self.period:
-                linear = prepared[1]
+        if self._plan is not None:
+            if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
+                plan, linear = prepared
             else:
+                plan = self._plan.shifted(t, self.period)
                 linear = self._linear(plan)
-            found = self._solved(plan, linear, x)
+            # how far the unknowns are from solving their equations, beside what they are
+            near = linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max()
+            if near and (found := self._improved(plan, linear, x, self.iterations))[1]:
+                return found
+        return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
+
+    def _improved(
+        self, plan: PlannedMotion, linear: Linear | None, x: np.ndarray, most: int
+    ) -> tuple[PlannedMotion, bool, float]:
+        """A plan after at most so many iterations, as `_iterated`; linear: at the plan, its program loaded."""
+        first, change = self._plan is None, math.inf
+        for k in range(most):
+            linear = self._linear(plan) if k else linear
+            if linear is None:
+                return plan, False, change
+            found = self._solved(plan, x)
             if first and found.unbounded:
-                check_plan(self.stages, plan, True)
+                checks.check_plan(self.stages, plan, True)
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
@@ -207,24 +220,52 @@ class Mpc:
             if change < STANDS:
                 break
         if first:
-            check_plan(self.stages, plan, False)
+            checks.check_plan(self.stages, plan, False)
         return plan, True, change
 
     def prepare(self) -> None:
-        """What can be done before the next measurement: the plan shifted by a period, and linearised."""
+        """What can be done before the next measurement: the plan shifted by a period, linearised, its program loaded."""
         begin = time.perf_counter()
         if self._plan is not None:
             plan = self._plan.shifted(self._plan.t + self.period, self.period)
-            self._prepared = plan.t, self._linear(plan)
+            self._prepared = plan, self._linear(plan)
         self._preparations.append(time.perf_counter() - begin)
 
-    def _linear(self, plan: PlannedMotion) -> Linear:
-        times = plan.t + self.period * np.arange(self.elements)
-        return self.stages.linear(plan.x[:-1], plan.w, plan.u, times)
+    def _linear(self, plan: PlannedMotion) -> Linear | None:
+        """The horizon linearised at a plan, its program loaded; None where a number is not finite."""
+        stages, times = self.stages, plan.t + self.period * np.arange(self.elements)
+        linear = stages.finite(plan.x[:-1], plan.w, plan.u, times)
+        if linear is None:
+            return None
+        (lower, upper), (H, g) = stages.rows, self.terminal.added(linear, plan)
+        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
+        if self.steady is not None:
+            P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
+            p = P @ (plan.x[-1] - rest)
+        stage = Stage(
+            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
+            stages.lower_u - plan.u, stages.upper_u - plan.u,
+        )  # fmt: skip
+        if self.moves.wanted:
+            stage = self.moves.added(stage, plan.u, self._applied)
+            P, p = np.pad(P, (0, stages.nu)), np.append(p, np.zeros(stages.nu))
+        self._program.load(stage, P, p)
+        return linear
+
+    def _solved(self, plan: PlannedMotion, x: np.ndarray) -> Found:
+        """What the loaded program says from a state (nx,)."""
+        first, added = x - plan.x[0], self.moves.wanted
+        found = self._program.solve(np.append(first, np.zeros(self.stages.nu)) if added else first)
+        return self.moves.removed(found, plan.u, self._applied) if added else found
+
+    def compiled(self) -> bool:
+        """Wait until the model is machine code, which a long run has made beside it; False without a C compiler."""
+        return self.stages.compiled()
 
     def reset(self) -> None:
-        """Forget the plan: the next step makes a first one."""
+        """Forget the plan and the estimates: the next step makes a first one."""
         self._plan = self._prepared = None
+        self._estimates |= self._modelled
         self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def run(
@@ -258,11 +299,13 @@ class Mpc:
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
-        It gives the inputs of `step` without a deadline, and what is not finite in a measurement is foretold likewise.
+        It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
+        foretold, or kept, and no plan is made anew.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
-        return controller_code(self, self._yielding, self._penalty, unknown, (MOST, self.iterations, STANDS))
+        limits = MOST, self.iterations, STANDS
+        return controller_code(self, self._yielding, self._penalty, unknown, limits, self._estimates)
 
     @property
     def held(self) -> dict[str, float]:
@@ -275,6 +318,20 @@ class Mpc:
 
     def _state(self, measured: Mapping[str, Any]) -> tuple[np.ndarray, bool]:
         """The measured state, scaled, and whether a part of it was not finite."""
+        instance(self.name, "measured", measured, Mapping, "values by name")
+        whole = [measured.get(name) for name in self.states]
+        plain = len(measured) == len(whole) and all(type(value) is float for value in whole)
+        x = np.array(whole if plain else self._named(measured), dtype=float) / self.stages.sizes_x
+        lost = not np.isfinite(x).all()
+        if lost:
+            if self._plan is None:
+                raise ModelError("the first measurement is not finite, expected numbers", place=self.name)
+            foretold = self._plan.x[0 if self.delay else 1]
+            x = np.where(np.isfinite(x), x, foretold)
+        return x, lost
+
+    def _named(self, measured: Mapping[str, Any]) -> list[float]:
+        """The elements of all states; estimates are kept."""
         names = (*self.states, *self.estimated)
         found = named_values(self.built.read.dae.flat, self.name, "measured", measured, names, finite=False)
         self._estimates |= {
@@ -284,47 +341,20 @@ class Mpc:
         if missing:
             words = f"measured lacks {', '.join(missing)}, expected all of {', '.join(self.states)}"
             raise ModelError(words, place=self.name)
-        x = np.array([found[name] for name in self.states], dtype=float) / self.stages.sizes_x
-        lost = not np.isfinite(x).all()
-        if lost:
-            if self._plan is None:
-                raise ModelError("the first measurement is not finite, expected numbers", place=self.name)
-            foretold = self._plan.x[0 if self.delay else 1]
-            x = np.where(np.isfinite(x), x, foretold)
-        return x, lost
+        return [found[name] for name in self.states]
 
     def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
         """The state a period later with the inputs held that are applied now, and whether the motion goes there."""
-        plan = self._first(x, t) if self._plan is None else self._plan
-        try:
-            return self.stages.moved(x, plan.w[0], self._applied, t)[self.stages.last], True
-        except ModelError:
-            return x, False
+        plan = self._first(x, t)
+        for begin in (plan if self._plan is None else self._plan, plan):
+            with suppress(ModelError):
+                return self.stages.moved(x, begin.w[0], self._applied, t)[self.stages.last], True
+        return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
         """A plan to begin with: at rest, or the guess."""
         plan = first_plan(self.stages, self.elements, x, t)
         return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
-
-    def _solved(self, plan: PlannedMotion, linear: Linear, x: np.ndarray) -> Found:
-        stages = self.stages
-        lower, upper = stages.rows
-        H, g = self.terminal.added(linear, plan)
-        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
-        if self.steady is not None:
-            P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
-            p = P @ (plan.x[-1] - rest)
-        stage = Stage(
-            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
-            stages.lower_u - plan.u, stages.upper_u - plan.u,
-        )  # fmt: skip
-        first = x - plan.x[0]
-        if not self.moves.wanted:
-            return self._program.solve(stage, P, p, first)
-        stage, none = self.moves.added(stage, plan.u, self._applied), np.zeros(stages.nu)
-        P = np.pad(P, (0, stages.nu))
-        found = self._program.solve(stage, P, np.append(p, none), np.append(first, none))
-        return self.moves.removed(found, plan.u, self._applied)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
         """Which rows of a stage are soft."""

@@ -125,5 +125,6 @@ def motion_result(
     named = ca.Function("variables", symbols, [ca.densify(built.expressed(names))])
     values = np.asarray(named(signals.T, times[None, :], stages.course_values(times)))
     units, words = labels(built.read.dae)
-    own: Any = dict(units=units, descriptions=words, title=title, held=[s.name for s in phase.inputs])
+    own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
+    own["held"] = [s.name for s in phase.inputs]
     return Result(times, dict(zip(names, values, strict=True)), **own)

@@ -233,15 +233,29 @@ class HorizonStages:
     def _at_points(self) -> AtPlaces:
         return AtPlaces(self.point)
 
+    def finite(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear | None:
+        """As `linear`; None where a number is not finite, or equations are singular."""
+        try:
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                found = self.linear(x, w, u, times)
+        except np.linalg.LinAlgError:
+            return None
+        numbers = (found.w, found.H, found.g, found.C, found.D, found.r)
+        return found if all(np.isfinite(one).all() for one in numbers) else None
+
+    def compiled(self) -> bool:
+        """Wait until what linearises is machine code; whether it is."""
+        return self._at_points.compiled()
+
     def moved(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, t: float) -> np.ndarray:
         """The unknowns of one stage (nw,) that solve its equations, from a guess; ModelError where there are none."""
         times = np.array([t])
         for _ in range(TURNS):
-            linear = self.linear(x[None], w[None], u[None], times)
+            linear = self.finite(x[None], w[None], u[None], times)
+            if linear is None:
+                break
             change = linear.w[0, :, 0]
             w = w + change
-            if not np.isfinite(change).all():
-                break
             if np.max(np.abs(change), initial=0.0) < SETTLED:
                 return w
         raise ModelError(

@@ -127,6 +127,20 @@ def test_what_is_measured_as_nothing_is_foretold_in_c_too(tmp_path):
     np.testing.assert_allclose(first, [[0.0], *given_by(mpc, states)], atol=2e-8)
 
 
+def test_estimates_are_given_behind_the_state_in_c(tmp_path):
+    mpc = Mpc(Upright, period=0.05, elements=10, disturbance=["pole.f"], parameters=["pole.length"])
+    code = mpc.c_code()
+    assert code.given == (*mpc.states, *mpc.estimated)
+    rows = np.array(
+        [[0.3, 0.2, 0.0, 0.0, 0.5, 0.0], [0.25, 0.15, 0.0, 0.0, 0.6, 2.0], [0.2, 0.1, 0.0, 0.0, np.nan, 3.0]]
+    )
+    inputs = [
+        list(mpc.step(dict(zip(code.given, row, strict=True)), 0.05 * k).values())
+        for k, row in enumerate(rows)
+    ]
+    np.testing.assert_allclose(Controller(code, tmp_path).run(rows), inputs, atol=2e-8)
+
+
 @pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
 def test_the_c_has_no_heap_and_no_memory_of_its_own(tmp_path):
     _, source = Mpc(Upright, period=0.05, elements=5).c_code().write(tmp_path)

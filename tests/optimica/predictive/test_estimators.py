@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, cos, der, sin
-from gantrytau_optimica import ExtendedKalman, Free, MovingHorizon, Optimization
+from gantrytau import Input, Model, ModelError, Parameter, Real, Samples, cos, der, sin
+from gantrytau_optimica import Experiment, ExtendedKalman, Free, MovingHorizon, Optimization
 
 PERIOD = 0.05
 
@@ -166,6 +166,33 @@ def test_a_parameter_at_its_limit_stays_there():
         assert one.status == "estimated"
         assert found["pendulum.length"] <= 0.7
     assert found["pendulum.length"] == pytest.approx(0.7, abs=1e-6)
+
+
+def test_along_a_record_it_is_the_same():
+    y, inputs = samples(12)
+    some, times = np.isfinite(y), PERIOD * np.arange(12)
+    record = Experiment(
+        {"x": Samples(times[some], y[some])},
+        {"u": Samples(times, np.append(inputs[1:], 0.0), kind="constant")},
+    )
+    estimator = ExtendedKalman(Cart, **CART)
+    found = estimator.run(record)
+    expected = filtered(y, inputs, of_radau(PERIOD))
+    np.testing.assert_allclose(np.column_stack([found["x"], found["v"]]), expected[:, :2], atol=1e-8)
+    np.testing.assert_allclose(found.time, times)
+    for other, told in [
+        (
+            Experiment({"x": Samples(times + 0.01 * (times > 0.1), times)}, {"u": 0.0}),
+            "lies between whole periods of 0.05 s",
+        ),
+        (Experiment({"v": Samples(times, times)}, {"u": 0.0}), "v is not among what is measured, x"),
+        (Experiment({"x": Samples(times, times)}), "inputs of the experiment lack u"),
+        (Experiment({"x": Samples(times, times)}, {"u": 0.0}, {"x": 1.0}), "found start of the experiment"),
+        (record.measured, "expected Experiment"),
+    ]:
+        with pytest.raises(ModelError) as raised:
+            estimator.run(other)
+        assert told in str(raised.value)
 
 
 @pytest.mark.parametrize("size", [1e-13, 1e6])

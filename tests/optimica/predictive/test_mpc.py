@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from gantrytau import Input, Model, ModelError, Parameter, Real, between, cos, der, sin
+from gantrytau import Input, Model, ModelError, Parameter, Real, animate, between, cos, der, sin
 from gantrytau_models import DeltaRobot
 from gantrytau_optimica import Free, Mpc, Optimization, at, final, initial, optimize
 
@@ -173,6 +173,7 @@ def test_closed_kinematic_loops_need_nothing_more():
     loop = Mpc(Reach, period=0.02, elements=10, terminal="lqr").run(stop=0.6)
     np.testing.assert_allclose(loop["robot.tool.r"][-1], [0.1, 0.05, -0.75], atol=1e-4)
     assert np.abs(loop["robot.arms[0].tau"]).max() <= 15.0
+    assert "Reach, closed loop" in animate(loop).text
 
 
 class FreeEnd(Rest):

@@ -135,7 +135,8 @@ class MovingHorizon(StateEstimator):
                 n + 1, stages.nx, stages.nx, np.zeros(rows, bool), finite, 1.0, ridge=0.0
             )
         D = self._spread()
-        found = self._programs[n].solve(stage, D[:, None] * H[-1] * D, D * g[-1], np.zeros(stages.nx))
+        self._programs[n].load(stage, D[:, None] * H[-1] * D, D * g[-1])
+        found = self._programs[n].solve(np.zeros(stages.nx))
         if not found.solved:
             return math.nan
         dx = found.x[1:] * D

@@ -6,11 +6,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import ModelError, Result
 from gantrytau.border.checks import number
 from gantrytau.border.refusal import Given
+from gantrytau_optimica.estimation.experiments import Experiment
 from gantrytau_optimica.predictive.estimators.observability import refuse_undetectable
 from gantrytau_optimica.predictive.estimators.observed_model import Noise, ObservedModel
+from gantrytau_optimica.predictive.estimators.recorded import recorded_estimates
 from gantrytau_optimica.predictive.unknowns import named_values
 
 EstimateStatus = Literal["estimated", "not converged", "lost", "failed"]
@@ -111,6 +113,14 @@ class StateEstimator(ABC):
         self._u = u
         self.status = "lost" if lost else solved
         return one.in_units(self._state())
+
+    def run(self, experiment: Experiment) -> Result:
+        """Estimates along what was recorded, from the first sample on, as a result by names.
+
+        experiment: samples at whole periods, of some or all that is measured, and inputs, held over a period as they are in
+        its middle. Raises ModelError for other samples.
+        """
+        return recorded_estimates(self, experiment)
 
     def _inputs(self, inputs: Mapping[str, Any] | None) -> np.ndarray:
         """Scaled inputs (nu,)."""

@@ -1,4 +1,4 @@
-"""Pictures of how measured places miss a reference, as Figures 5.14, 5.15 and 5.17 to 5.19 of the thesis."""
+"""Pictures of how measured places miss a reference, as Figures 5.15 and 5.17 to 5.19 of the thesis."""
 
 import os
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ AXES = "xyz"
 
 
 def plot_comparison(comparison: Comparison, *, file: str | os.PathLike[str] | None = None) -> "Figure":
-    """Figures 5.14, 5.15, 5.17 to 5.19: a map in two views with enlarged error arrows, histograms of amounts and by axis."""
+    """Figures 5.15, 5.17 to 5.19: a map in two views with enlarged error arrows, histograms of amounts and by axis."""
     from matplotlib.figure import Figure
 
     if file is not None:
