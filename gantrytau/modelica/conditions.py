@@ -1,6 +1,7 @@
 """Conditions of `when` as they stand in a text, and what is asked for before an instant."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from gantrytau.modelica import tree
@@ -80,6 +81,22 @@ def targets(items: Items) -> Iterator[str]:
         for each in item.targets if isinstance(item, tree.Assignment) else several:
             if isinstance(each, tree.ComponentReference):
                 yield each.parts[0][0]
+
+
+def joined_whens(items: Items) -> list[tree.EquationOrStatement]:
+    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first."""
+    found: list[Any] = []
+    for item in items:
+        both = [one for one in (*found[-1:], item) if isinstance(one, tree.Branching) and one.word == "when"]
+        named = [frozenset(targets(inner)) for one in both for _, inner in one.branches]
+        values = [one.value for one in nodes_of(item) if isinstance(one, tree.Assignment)]
+        tests = [test for one in both for test, _ in one.branches]
+        reads = {one.parts[0][0] for one in references([values, tests])}
+        if len(both) == 2 and len(set(named)) == 1 and not reads & named[0]:
+            item = replace(both[1], branches=(*both[1].branches, *both[0].branches))
+            found.pop()
+        found.append(item)
+    return found
 
 
 def whens_in(structure: Any) -> Iterator[tree.Branching]:

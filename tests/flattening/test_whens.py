@@ -180,11 +180,6 @@ STATEMENTS = [  # names of MEMBERS, statements behind two equations, and what is
     ("", ["self.h > 0"], "expected an equation"),
     ("ny", ["self.y == der(self.n)", SET], "der(): found n, which jumps at instants"),
     ("ny", ["self.y == der(self.h * self.n)", SET], "der(): found n"),
-    (
-        "nxy",
-        ["self.x == self.n * self.h", "self.y == der(self.x)", SET],
-        "n is a Discrete and jumps at instants",
-    ),
     ("z", ["self.z == pre(self.h)"], "equation 3: found pre(h), expected it in when(...) only"),
     ("z", ["sampled(self.z, pre(self.h), period=0.1)"], "found pre(h), expected it in when(...) only"),
     (

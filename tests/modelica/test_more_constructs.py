@@ -180,6 +180,16 @@ INSTANTS = """package Instants
     table := {{1, 2}, {3, 4}};
     table[place, :] := {time, 5};
   end Buffer;
+  model Button "set at 1 and 3, reset at 2 and 3"
+    Boolean on(start = false);
+  algorithm
+    when sample(2, 1) then
+      on := false;
+    end when;
+    when sample(1, 2) then
+      on := true;
+    end when;
+  end Button;
   model Sampled
     Integer n(start = 0), m(start = 0);
     Real last(start = -1);
@@ -217,6 +227,11 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
     assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
     with pytest.raises(SolveError):
         simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_the_later_of_two_whens_of_an_algorithm_wins(instants):
+    result = simulate(instants["Instants.Button"](), stop=3.9)
+    assert [float(result.at(t, "on")) for t in (0.5, 1.5, 2.5, 3.5)] == [0, 1, 0, 1]
 
 
 def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants):
@@ -296,3 +311,33 @@ def test_an_expandable_connector_has_what_is_connected_to_it(tmp_path):
     assert result.final("unit.bus.speed") == 2
     assert result.final("ground.p.v") == pytest.approx(0.5)
     assert not any("spare" in name for name in result.names)
+
+
+GUESSED = """package Guessed
+  model Lag
+    parameter Real begins = 0 "where it starts";
+    Real y(start = begins);
+  initial equation
+    y = begins;
+  equation
+    der(y) = 1 - y;
+  end Lag;
+  model Base
+    parameter Real k = 2 "in the base";
+  end Base;
+  model Whole
+    extends Base;
+    parameter Real k = 2 "the same, told otherwise";
+    parameter Real found(fixed = false);
+    Lag lag(begins = found);
+  initial equation
+    found = 2 * k;
+  end Whole;
+end Guessed;
+"""
+
+
+def test_a_guess_that_initial_equations_determine_is_left_to_them(tmp_path):
+    (tmp_path / "guessed.mo").write_text(GUESSED)
+    result = simulate(load_modelica(tmp_path / "guessed.mo")["Guessed.Whole"](), stop=1.0)
+    assert result.at(0.0, "lag.y") == pytest.approx(4)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import Items, targets
+from gantrytau.modelica.conditions import Items, joined_whens, targets
 from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
@@ -218,6 +218,7 @@ def stated_by_algorithm(
     items: Items, reader: Interpreter, wanted: Collection[str] | None = None
 ) -> Iterator[Any]:
     """What an algorithm of a model amounts to: whens, and an equation for each variable assigned, or for each wanted."""
+    items = joined_whens(items)
     whens = [one for one in items if isinstance(one, tree.Branching) and one.word == "when"]
     held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
     names = [n for n in dict.fromkeys(targets(items)) if n not in held]

@@ -148,6 +148,12 @@ class Element:
     modifier: Modifier
     protected: bool = False
 
+    @property
+    def stated(self) -> tuple[Any, ...]:
+        """What its declaration says, but for description and annotation."""
+        bare = replace(self.declaration, description=None, annotation=None)
+        return self.clause.prefixes, self.clause.type, self.clause.subscripts, bare
+
     def under(self, over: Modifier) -> Modifier:
         """What stays said of it under a modification; what redeclares it keeps its constraint alone, if it has one."""
         constraint = self.clause.constraint

@@ -111,6 +111,8 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     for name, attribute in said.inner.items():
         if attribute.value is None or name in IGNORED:
             continue
+        if name == "start" and "fixed" not in said.inner and _is_solved(structure, attribute.value):
+            continue  # a guess that is known after the start only
         if name in NUMBERS and not structure.is_fixed(attribute.value):
             words = f"found a variable in '{name}', expected parameters; a value at the start is an initial equation"
             attribute.scope.refuse(attribute.at, words)
@@ -145,6 +147,12 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
     if "display" in found and not _displayed(found["display"], found.get("unit")):
         del found["display"]
     return found
+
+
+def _is_solved(structure: Structure, value: Any) -> bool:
+    """Whether an expression depends on parameters that initial equations determine, and on no variable."""
+    leaves = [structure.leaf(one) for one in references(value) if not structure.is_fixed(one)]
+    return bool(leaves) and all(one is not None and (one.is_solved or one.follows) for one in leaves)
 
 
 def _has_dimension(unit: str) -> bool:

@@ -238,8 +238,7 @@ class ClassScope:
 
     def _check_same(self, one: Element, other: Element) -> None:
         """TextError for two declarations of one name that say different things."""
-        about = [(x.clause.prefixes, x.clause.type, x.clause.subscripts, x.declaration) for x in (one, other)]
-        if about[0] != about[1] or not one.modifier.says_the_same(other.modifier):
+        if one.stated != other.stated or not one.modifier.says_the_same(other.modifier):
             places = " and in ".join(x.scope.name for x in (one, other))
             self.refuse(
                 other.declaration.at if other.scope is self else self.definition.at,

@@ -196,10 +196,9 @@ class Mpc:
                 plan = self._plan.shifted(t, self.period)
                 linear = self._linear(plan)
             # how far the unknowns are from solving their equations, beside what they are
-            if linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max():
-                found = self._improved(plan, linear, x, self.iterations)
-                if found[1]:
-                    return found
+            near = linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max()
+            if near and (found := self._improved(plan, linear, x, self.iterations))[1]:
+                return found
         return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
 
     def _improved(
@@ -238,8 +237,7 @@ class Mpc:
         linear = stages.finite(plan.x[:-1], plan.w, plan.u, times)
         if linear is None:
             return None
-        lower, upper = stages.rows
-        H, g = self.terminal.added(linear, plan)
+        (lower, upper), (H, g) = stages.rows, self.terminal.added(linear, plan)
         P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
         if self.steady is not None:
             P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
@@ -302,7 +300,7 @@ class Mpc:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
         It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
-        foretold, or kept, likewise. It makes no plan anew.
+        foretold, or kept, and no plan is made anew.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
