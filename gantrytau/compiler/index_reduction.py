@@ -143,7 +143,7 @@ def _mentioned(reduced: Reduced, flat: FlatModel, wanted: Sequence[str]) -> np.n
 
 
 def _without_factors(reduced: Reduced, flat: FlatModel) -> set[str]:
-    """Derivatives that only products with parameters have that are folded in and zero, as the voltage of no capacitance."""
+    """Derivatives whose only factors are parameters that are folded in as zero: the voltage of a capacitance of 0."""
     if not any(p.fold for p in flat.parameters):
         return set()
     others = [e for w in flat.whens for e in (w.condition, *(v for _, v in (*w.reinits, *w.assignments)))]

@@ -161,7 +161,7 @@ class _Defining:
                     self._lone.setdefault(symbol.name, []).append((one, other))
 
     def define(self, name: str, needed: bool = False) -> bool:
-        """Whether a scalar has a definition by what is known; needed: variables may stand in it, which then remain such."""
+        """Whether a scalar has a definition from known quantities; needed: the definition may hold variables, too."""
         self._busy.add(name)
         for one, side in self._lone.get(name, ()) if name not in self.found else ():
             leaves = dict.fromkeys(split_derivative(leaf)[0] for leaf in leaf_names([side]))
@@ -180,7 +180,7 @@ class _Defining:
 
 
 def inlined(quantities: Iterable[Placed]) -> Iterator[Placed]:
-    """Those of which an equation may say what they are."""
+    """The quantities that an equation may define."""
     for one in quantities:
         fixed = one.attributes.get("fixed")
         if (

@@ -152,7 +152,7 @@ def gives_value_before(item: tree.EquationOrStatement) -> bool:
 
 
 def outer_name(name: str) -> str:
-    """The member by which a class reaches the component around it that is `inner` of that name, where it has one as well."""
+    """The name for the outer side of a component that is `inner` and `outer` at once."""
     return f"outer {name}"
 
 

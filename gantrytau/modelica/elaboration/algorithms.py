@@ -172,7 +172,7 @@ class Execution:
         self.reader.scope.refuse(item.at, f"found a loop of {MOST_ROUNDS} rounds, expected one that ends")
 
     def _unrolled(self, item: tree.WhileLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
-        """A `while` of varying length: as many conditions on what it does as it has rounds at most."""
+        """A `while` of varying length: its statements once for each possible round, each time under its condition."""
         count = most_rounds(item, reader)
         if count is None:
             words = "found a loop whose length varies, expected 'while i < n' with a known n, a subscript i, and i := i + 1"

@@ -141,7 +141,7 @@ def _tables(mpc: Any, rows: list[str], first: PlannedMotion) -> Iterable[str]:
 
 
 def _rest(steady: SteadyState | None, stages: HorizonStages) -> tuple[np.ndarray, np.ndarray]:
-    """What it costs to be away from the state of rest, and that state; ModelError where it moves with time."""
+    """The cost of a distance from the state of rest, and the state of rest; ModelError where it moves with time."""
     if steady is None:
         return np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
     if steady.changes:

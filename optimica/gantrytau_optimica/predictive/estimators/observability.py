@@ -1,4 +1,4 @@
-"""What samples never show: directions of the state without influence on any of them that do not decay by themselves."""
+"""Directions of the state without influence on any sample, unless they decay by themselves."""
 
 import numpy as np
 
