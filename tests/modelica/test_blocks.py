@@ -139,4 +139,4 @@ def test_assertions_of_a_branch_hold_where_it_acts(ran):
 def test_a_model_with_assertions_is_linearised(tmp_path):
     text = 'model M input Real u; output Real y(start=0); equation der(y) = u - 2*y; assert(y < 1, "far"); end M;'
     (tmp_path / "m.mo").write_text(text)
-    assert linearize(load_modelica(tmp_path / "m.mo")["M"]).poles == pytest.approx([-2])
+    assert linearize(load_modelica(tmp_path / "m.mo")["M"]()).poles == pytest.approx([-2])

@@ -65,7 +65,7 @@ class Struck(Model):
         RECORD,
         r=PLACE,
         friction=DahlFriction,
-        carts=[dict(law=dict(sigma_0=f_c / PRESLIDING)) for f_c in RECORD.coulomb],
+        carts=[dict(law=dict(sigma_0=f_c / PRESLIDING)) for f_c in np.array(RECORD.coulomb)],
     )
     force = WorldForce()
     servos = Array(

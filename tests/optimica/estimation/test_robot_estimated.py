@@ -1,6 +1,7 @@
 """Ten numbers of the three-link robot from four seconds at 250 Hz: masses and friction, within a minute."""
 
 import time
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ def from_rest_to_rest(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_masses_and_friction_of_the_robot_within_a_minute():
     """Carts that turn around eight times: steep friction, corners of the forces at every sample, guesses far off."""
     l1 = prototypes.L1
-    truth = {"plate_mass": l1.plate_mass}
+    truth: dict[str, Any] = {"plate_mass": l1.plate_mass}
     for i in range(3):
         names = (f"carts[{i}].m", f"carts[{i}].law.f_c", f"carts[{i}].law.f_v")
         truth |= dict(zip(names, (l1.cart_masses[i], l1.coulomb[i], l1.viscous[i]), strict=True))
