@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau.answers.many_points.elimination import solved
 from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.compiler.parameters import parameter_table, with_values
@@ -130,15 +129,7 @@ class Kinematics(Record):
         Velocities are resolved in the world. Infinite or NaN in singular poses and out of reach.
         """
         at = poses(r, R, "Kinematics.rates")
-        if isinstance(self._solver, ModelFunctions):
-            return answered(at.one, self._solver.rates(at.r, at.R))[0]
-        matrix = self._solver.jacobian(at.r, at.R)
-        if matrix.shape[1] != matrix.shape[2]:
-            raise ModelError(
-                f"Kinematics.rates: found an orientation R for {self.dae.name}, whose three carts do not choose it; "
-                "leave it out"
-            )
-        return answered(at.one, solved(matrix, np.broadcast_to(np.eye(matrix.shape[1]), matrix.shape)))[0]
+        return answered(at.one, self._solver.rates(at.r, at.R))[0]
 
     def variables(self, names: str | Sequence[str], r: Any, R: Any = None) -> list[np.ndarray]:
         """Values of other variables of the model in poses, such as angles of passive joints, (N, k) each; (k,) for one pose.

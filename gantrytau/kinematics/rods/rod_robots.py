@@ -24,8 +24,8 @@ from gantrytau.kinematics.rods.rod_geometry import RodGeometry
 from gantrytau.kinematics.rotations import best_rotation
 
 NO_ORIENTATION = (
-    "Kinematics: found {what}, expected one, as this robot can turn its plate; give R of shape (3, 3) or (N, 3, 3), such as "
-    "kinematics.home.R"
+    "Kinematics: found no orientation R, expected one, as this robot can turn its plate; give R of shape "
+    "(3, 3) or (N, 3, 3), such as kinematics.home.R"
 )
 NO_TURN = 1e-9  # of an element of R - I that a plate without rotation may be asked for
 
@@ -62,6 +62,11 @@ class RodRobot(Record):
     def jacobian(self, r: np.ndarray, R: np.ndarray | None = None) -> np.ndarray:
         """dq/dpose (N, n, 3) or (N, n, 6)."""
         raise NotImplementedError
+
+    def rates(self, r: np.ndarray, R: np.ndarray | None = None) -> np.ndarray:
+        """Velocity of the tool by joint rates, (N, 3, n), or with R the angular velocity below it, (N, 6, n)."""
+        matrix = self.jacobian(r, R)
+        return solved(matrix, np.broadcast_to(np.eye(matrix.shape[1]), matrix.shape))
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -241,13 +246,21 @@ class SixRods(RodRobot):
         each = -by_pose / by_joints.sum(axis=2)[:, :, None]
         return np.stack([each[:, self.geometry.links_of(i)].mean(axis=1) for i in self.geometry.arms], axis=1)
 
+    def rates(self, r, R=None):
+        """With R by all six links, which decide more than the carts choose."""
+        if R is None:
+            return super().rates(r)
+        q, _ = self.ik(r, R)
+        _, _, by_pose, by_joints = self.geometry.slopes(q, r, R)
+        return -solved(by_pose, by_joints)
+
 
 class FiveRods(SixRods):
     """Six links on five carts, the first three on guideways of their own: two angles of the plate are free."""
 
     def follow(self, r, sides):
         """Refused, as no orientation follows from a position."""
-        raise ModelError(NO_ORIENTATION.format(what=f"{len(self.joints)} joints and no orientation R"))
+        raise ModelError(NO_ORIENTATION)
 
 
 class TurningRods(RodRobot):
@@ -256,7 +269,7 @@ class TurningRods(RodRobot):
     def ik(self, r, R=None, sides=None):
         """Coordinates q and iterations: five degrees (4.25), then Newton arm by arm (4.27) to (4.29)."""
         if R is None:
-            raise ModelError(NO_ORIENTATION.format(what="no orientation R"))
+            raise ModelError(NO_ORIENTATION)
         sides = self.sides if sides is None else sides
         q, iterations = np.full((len(r), 6), np.nan), np.zeros(len(r), dtype=int)
         rows = np.flatnonzero(self.geometry.could_reach(r))

@@ -78,7 +78,7 @@ def test_of_the_orientation_two_angles_can_be_chosen(robot):
     kept = [robot.ik(home.r, turned(home.R[None], 0.02 * np.eye(3)[[k]])[0]) for k in range(3)]
     assert any(np.isnan(q).all() for q in kept)
     assert np.isfinite(robot.ik(home.r, home.R)).all()
-    with pytest.raises(ModelError, match="found 5 joints and no orientation R"):
+    with pytest.raises(ModelError, match="found no orientation R"):
         robot.ik(home.r)
 
 
