@@ -17,7 +17,7 @@ from gantrytau_optimica.predictive.terminal import Terminal
 MOST = 500  # iterations of Ipopt
 OPTIONS = {
     "print_time": False, "error_on_fail": False,
-    "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MOST, "bound_relax_factor": 0.0},
+    "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MOST, "bound_relax_factor": 0.0, "mu_strategy": "adaptive"},
 }  # fmt: skip
 
 
