@@ -15,7 +15,7 @@ from tests.classics.mechanisms import bar
 
 FIRST, FINER = 100, 4  # steps a second at first, and how many times as many in the next run
 LONGEST = 60.0  # s of the last run
-Place = Sequence[float]
+Place = Sequence[float] | np.ndarray
 Part = tuple[int, Place]  # a body and a point of it, from its centre of mass
 STILL = (0.0, 0.0, 0.0)
 
