@@ -230,6 +230,8 @@ def condition(value: Any) -> Any:
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
     """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
+    if isinstance(then, list) and isinstance(otherwise, list):
+        return [chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)]
     if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
         a, b = record_value(then), record_value(otherwise)
         return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
@@ -273,6 +275,8 @@ def _size(value: Any, dimension: int | None = None) -> Any:
 
 
 def _filled(value: Any, *sizes: int) -> Any:
+    if not (is_plain(value) or value is None):
+        return [_filled(value, *sizes[1:]) for _ in range(sizes[0])] if sizes else value
     found = np.empty(sizes, dtype=object)
     for place in np.ndindex(*sizes):
         found[place] = value
