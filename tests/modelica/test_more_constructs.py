@@ -180,6 +180,15 @@ INSTANTS = """package Instants
     table := {{1, 2}, {3, 4}};
     table[place, :] := {time, 5};
   end Buffer;
+  model Turns "the place of what is changed varies, too"
+    Integer count[3](each start = 0), k(start = 1), older(start = 0);
+  algorithm
+    when sample(0.1, 0.2) then
+      older := pre(count[k]);
+      count[k] := pre(count[k]) + 1;
+      k := mod(pre(k), 3) + 1;
+    end when;
+  end Turns;
   model Button "set at 1 and 3, reset at 2 and 3"
     Boolean on(start = false);
   algorithm
@@ -227,6 +236,17 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
     assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
     with pytest.raises(SolveError):
         simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_the_value_before_an_instant_at_the_place_of_now(instants):
+    result = simulate(instants["Instants.Turns"](), stop=1.0)
+    assert [result.final(name) for name in ("count[1]", "count[2]", "count[3]", "k", "older")] == [
+        2,
+        2,
+        1,
+        3,
+        1,
+    ]
 
 
 def test_the_later_of_two_whens_of_an_algorithm_wins(instants):

@@ -486,7 +486,7 @@ static int mpc_later(controller_state *it, double *x, double t) {
     return change < 1e-10;
 }
 
-/* One iteration of Gauss and Newton from state x at time t; the largest change of an input, below 0 without solution. */
+/* One iteration of Gauss and Newton from state x at time t; the largest change of an input or state, below 0 without solution. */
 static double mpc_iterate(controller_state *it, const double *x, double t) {
     mpc_work *work = &it->work;
     double first[NQ] = {0}, o[NU], change = 0;
@@ -508,7 +508,7 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         const mpc_stage *s = &work->stages[k];
         double by[1 + NV];
         by[0] = 1;
-        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i];
+        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i], change = fmax(change, fabs(s->v[i]));
         FOR(i, NU) {
             const double before = k ? it->plan.u[k - 1][i] : it->applied[i];
             by[1 + NX + i] = mpc_chosen[k] ? s->v[NQ + i] : s->v[NX + i] + before - it->plan.u[k][i];
@@ -517,7 +517,7 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         FOR(m, NW) FOR(j, 1 + NV) it->plan.w[k][m] += work->unknowns[k][m][j] * by[j];
         FOR(i, NU) it->plan.u[k][i] += by[1 + NX + i];
     }
-    FOR(i, NX) it->plan.x[N][i] += work->end_v[i];
+    FOR(i, NX) it->plan.x[N][i] += work->end_v[i], change = fmax(change, fabs(work->end_v[i]));
     return change;
 }
 
