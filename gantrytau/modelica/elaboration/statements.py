@@ -204,6 +204,11 @@ def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         for one, other in zip(a, b, strict=True):
             yield from _ends(one, other)
         return
+    if values.size_words(a) != values.size_words(b):
+        words = " and ".join(map(values.size_words, (a, b)))
+        raise ModelError(f"found connectors of the sizes {words}, expected one size")
+    if 0 in values.all_sizes(a):
+        return
     found = [getattr(x, "instance", None) if hasattr(x, "member") else values.to_casadi(x) for x in (a, b)]
     if any(x is None or isinstance(x, (bool, int, float, str)) for x in found):
         raise ModelError("found what is no connector in connect(), expected two connectors")

@@ -177,8 +177,7 @@ def _quotient(a: Any, b: Any) -> Any:
 def _power(a: Any, b: Any) -> Any:
     if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)):
         return a**b
-    shape = np.shape(boxed(a))
-    if len(shape) != 2 or shape[0] != shape[1] or not isinstance(b, int) or b < 0:
+    if len({*all_sizes(a)}) != 1 or np.ndim(a) != 2 or not isinstance(b, int) or b < 0:
         words = (
             f"found {sized(a)} and {sized(b)} beside '^', expected a square matrix and a known Integer from 0"
         )
@@ -282,7 +281,7 @@ def _size(value: Any, dimension: int | None = None) -> Any:
 
 def _filled(value: Any, *sizes: int) -> Any:
     if not (is_plain(value) or value is None):
-        return [_filled(value, *sizes[1:]) for _ in range(sizes[0])] if sizes else value
+        return [_filled(value, *sizes[1:]) if sizes[1:] else value] * sizes[0]
     found = np.empty(sizes, dtype=object)
     for place in np.ndindex(*sizes):
         found[place] = value
