@@ -17,8 +17,9 @@ from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.predictive import horizon_checks as checks
 from gantrytau_optimica.predictive.c_code import controller_code
 from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.compiled_horizon import compiled_horizon
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
-from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, failed
+from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, Loaded, failed
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
@@ -27,7 +28,7 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
-from gantrytau_optimica.predictive.stages import HorizonStages, Linear
+from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState
 from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
 from gantrytau_optimica.problem.optimization import Optimization
@@ -104,7 +105,7 @@ class Mpc:
         self.terminal, self._penalty = self._newton.terminal, weight
         self._guess = guess
         self._plan: PlannedMotion | None = None
-        self._prepared: tuple[PlannedMotion, Linear | None] | None = None
+        self._prepared: tuple[PlannedMotion, Loaded | None] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
         self._missed = 0
@@ -157,9 +158,11 @@ class Mpc:
         before = self._plan
         found, wanted = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
         late = before is not None and time.perf_counter() - begin > self.deadline
-        kept = found.plan if before is None else before.shifted(t, self.period)
+        kept = found.plan
+        if before is not None and (late or not found.solved):
+            kept = before.shifted(t, self.period)
         self._plan = found.plan if found.solved else None if before is None else kept
-        held = kept.u[0] if late or not found.solved else found.plan.u[0]
+        held = kept.u[0]
         held = self.moves.reached(held, self._newton.applied)
         self._newton.applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
         self._missed += late
@@ -185,19 +188,19 @@ class Mpc:
         prepared, self._prepared = self._prepared, None
         if self._plan is not None:
             if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
-                plan, linear = prepared
+                plan, loaded = prepared
             else:
                 plan = self._plan.shifted(t, self.period)
-                linear = self._newton.linear(plan)
+                loaded = self._newton.load(plan)
             # how far the unknowns are from solving their equations, beside what they are
-            near = linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max()
-            if near and (found := self._newton.improved(plan, linear, x, self.iterations)).solved:
+            near = loaded is not None and loaded.missed < 1.0 + np.abs(plan.w).max()
+            if near and (found := self._newton.improved(plan, loaded, x, self.iterations)).solved:
                 return found, self._converged
         return self._begun(self._first(x, t), x), True
 
     def _begun(self, first: PlannedMotion, x: np.ndarray) -> Iterated:
         """The plan from a first one: full steps, and where these do not converge, steps of such lengths that they do."""
-        found = self._newton.improved(first, self._newton.linear(first), x, MOST)
+        found = self._newton.improved(first, self._newton.load(first), x, MOST)
         if self._plan is None and found.unbounded:
             checks.check_plan(self.stages, found.plan, True)
         if not found.stands:
@@ -212,11 +215,16 @@ class Mpc:
         begin = time.perf_counter()
         if self._plan is not None:
             plan = self._plan.shifted(self._plan.t + self.period, self.period)
-            self._prepared = plan, self._newton.linear(plan)
+            self._prepared = plan, self._newton.load(plan)
         self._preparations.append(time.perf_counter() - begin)
 
     def compiled(self) -> bool:
-        """Wait until the model is machine code, which a long run has made beside it; False without a C compiler."""
+        """Wait until the controller is machine code; False without a C compiler.
+
+        The model becomes that in a long run anyway; the quadratic program only here, and where `c_code` can be had.
+        """
+        with suppress(ModelError):
+            self._newton.code = compiled_horizon(self.c_code(), self.stages, self.elements)
         return self.stages.compiled()
 
     def reset(self) -> None:
