@@ -270,7 +270,7 @@ class Mpc:
     def resume(self, plan: PlannedMotion, applied: Mapping[str, float], times: StepTimes) -> None:
         """Be as after the step that made a plan, with these inputs held."""
         self._plan, self._prepared = plan, None
-        self._applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
+        self._newton.applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
         self._preparations, self._steps = list(times.preparation), list(times.step)
         self._missed = times.missed
 
