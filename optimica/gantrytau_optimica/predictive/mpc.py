@@ -16,10 +16,12 @@ from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.predictive import horizon_checks as checks
 from gantrytau_optimica.predictive.c_code import controller_code
-from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
 from gantrytau_optimica.predictive.compiled_horizon import compiled_horizon
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
 from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, Loaded, failed
+from gantrytau_optimica.predictive.loop.closed_loop import ClosedLoop
+from gantrytau_optimica.predictive.loop.model_loop import PARTS, model_loop
+from gantrytau_optimica.predictive.loop.sensors import Sensors
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
@@ -28,9 +30,10 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
+from gantrytau_optimica.predictive.staged_problem import staged
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState
-from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
+from gantrytau_optimica.predictive.unknowns import named_values
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
@@ -92,7 +95,7 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self.built, self.stages, self._estimates = staged(problem, self.period, disturbance, parameters)
         self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         checks.check_bounded(self.stages)
@@ -239,24 +242,38 @@ class Mpc:
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
         estimator: StateEstimator | None = None,
+        after: ClosedLoop | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
         plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
         the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
         an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
+        after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
         """
-        if estimator is not None:
-            instance("run", "estimator", estimator, StateEstimator, "a MovingHorizon or an ExtendedKalman")
+        sensors = Sensors(self, noise or {}, seed, estimator)
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
-        other = (
-            _staged(plant, step)[:2]
-            if plant is not None
-            else (self.built, HorizonStages(self.built.problem, step))
-        )
-        return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
+        own = plant is None
+        other = (self.built, HorizonStages(self.built.problem, step)) if own else staged(plant, step)[:2]
+        return model_loop(self, other, stop, start or {}, sensors, after)
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What a loop must have in common with this controller to go on with it."""
+        return self.states, self.inputs, self.period, self.elements, self.delay
+
+    def resume(self, plan: PlannedMotion, applied: Mapping[str, float], times: StepTimes) -> None:
+        """Be as after the step that made a plan, with these inputs held."""
+        self._plan, self._prepared = plan, None
+        self._newton.applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
+        self._preparations, self._steps = list(times.preparation), list(times.step)
+        self._missed = times.missed
+
+    def planned_motion(self, x: np.ndarray, t: float) -> PlannedMotion:
+        """The plan of the last step; where there is none, rest in a state (nx,) in its units from t on."""
+        return self._first(x / self.stages.sizes_x, t) if self._plan is None else self._plan
 
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
@@ -334,24 +351,3 @@ class Mpc:
         """Words of the soft limits, where the plan passes one."""
         passed = zip(self.stages.row_names, self._yielding & np.any(slack > 1e-6), strict=True)
         return tuple(dict.fromkeys(name for name, so in passed if so))
-
-
-def _staged(
-    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
-) -> tuple[Any, HorizonStages, dict[str, float]]:
-    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
-    horizon can have.
-    """
-    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
-    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
-    read, found = built.read, built.problem
-    if found.free:
-        names = ", ".join(n.name for n in found.free)
-        raise ModelError(
-            f"{names} is free, expected a number: a receding horizon has a fixed length and a fixed model; give it a value, "
-            "as in final_time = 1.0",
-            place=read.name,
-        )
-    if not any(phase.inputs for phase in found.phases):
-        raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, HorizonStages(found, period), estimates

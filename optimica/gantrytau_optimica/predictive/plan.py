@@ -107,9 +107,14 @@ def guessed_plan(
 
 
 def motion_result(
-    built: Built, stages: HorizonStages, motion: PlannedMotion, period: float, title: str
+    built: Built,
+    stages: HorizonStages,
+    motion: PlannedMotion,
+    period: float,
+    title: str,
+    ahead: float = 0.0,
 ) -> Result:
-    """All variables of a model at the samples of a motion, its inputs held.
+    """All variables of a model at the samples of a motion, its inputs held; those of `ahead` s later than each sample.
 
     Algebraic variables are those at the end of the period before, with its inputs.
     """
@@ -123,7 +128,8 @@ def motion_result(
     symbols = [ca.vertcat(*(s.symbol for s in phase.signals)), stages.problem.time]
     symbols.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
     named = ca.Function("variables", symbols, [ca.densify(built.expressed(names))])
-    values = np.asarray(named(signals.T, times[None, :], stages.course_values(times)))
+    later = times + ahead
+    values = np.asarray(named(signals.T, later[None, :], stages.course_values(later)))
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
     own["held"] = [s.name for s in phase.inputs]
