@@ -66,7 +66,8 @@ def driven_loop(
     title = f"{mpc.name}, closed loop with {record.title or 'a plant'}"
     found = motion_result(mpc.built, mpc.stages, motion, mpc.period, title, told=told)
     planned: Any = planned_by(mpc, [law.made[i] for i in made], found.time)
-    kept: Any = dict(estimates=sensors.estimates, record=record)
+    parameters = dict(mpc.built.read.dae.parameter_values)
+    kept: Any = dict(estimates=sensors.estimates, record=record, parameters=parameters)
     return ClosedLoop(found, tuple(statuses), mpc.timing, cost, **planned, **kept)
 
 
