@@ -57,11 +57,11 @@ class PlannedMotion:
     u: np.ndarray
     t: float
 
-    def changed(self, linear: Linear, found: Found) -> "PlannedMotion":
-        """The plan after a step of Gauss-Newton's method."""
+    def changed(self, linear: Linear, found: Found, share: float = 1.0) -> "PlannedMotion":
+        """The plan after a step of Gauss-Newton's method, or a share of it."""
         v = np.concatenate([np.ones((len(self.u), 1)), found.x[:-1], found.u], axis=1)
-        w = self.w + np.einsum("nij,nj->ni", linear.w, v)
-        return PlannedMotion(self.x + found.x, w, self.u + found.u, self.t)
+        w = self.w + share * np.einsum("nij,nj->ni", linear.w, v)
+        return PlannedMotion(self.x + share * found.x, w, self.u + share * found.u, self.t)
 
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
