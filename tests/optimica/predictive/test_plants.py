@@ -1,15 +1,16 @@
 """`Mpc.run` with plants that run by themselves: an FMU is the model that it was made of, a robot's controller, refusals."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from gantrytau import ModelError
+from gantrytau import Input, Model, ModelError, Parameter, Real, der
 from gantrytau_fmu import Channel, PythonComponent, export_fmu
 from gantrytau_fmu.controller import AxisLimits, Controller
-from gantrytau_optimica import ExtendedKalman, Mpc
+from gantrytau_models import CartServo
+from gantrytau_optimica import ExtendedKalman, Mpc, Optimization, Rig
 from tests.optimica.predictive.test_mpc import Pole, Rest, Upright
 
 SAME = 1e-3  # N: an FMU integrates with a relative tolerance of 1e-6, the model has steps of third order
@@ -89,6 +90,61 @@ def test_an_estimator_sees_what_the_plant_gives():
     plant: Any = Controller(exact_cart(0.05), period=0.05)
     found, model = mpc.run(plant, stop=3.0, **seen), mpc.run(stop=3.0, **seen)
     np.testing.assert_allclose(found["cart.x"], model["cart.x"], rtol=0, atol=1e-6)
+
+
+class Sledge(Model):
+    """A mass on a guideway."""
+
+    m = Parameter(80.0, unit="kg")
+    s, v = Real(unit="m"), Real(unit="m/s")
+    f = Input(unit="N", start=0.0)
+
+    def equations(self):
+        yield self.v == der(self.s)
+        yield self.m * der(self.v) == self.f
+
+
+class Axis(Model):
+    """It alone."""
+
+    x = Sledge()
+
+
+class Servo(Model):
+    """An axis under its servo, seen from its reference."""
+
+    k_p = Parameter(9.0, unit="1/s")
+    q = Real(unit="m", start=0.0)
+    q_ref = Input(unit="m", start=0.0, min=-0.02, max=0.02)
+
+    def equations(self):
+        yield der(self.q) == self.k_p * (self.q_ref - self.q)
+
+
+class There(Optimization):
+    """The axis shall be at 10 mm."""
+
+    servo = Servo()
+
+    def integrand(self):
+        return (self.servo.q - 0.01) ** 2 + 0.1 * (self.servo.q_ref - 0.01) ** 2
+
+
+def test_a_rig_in_the_loop_moves_as_by_the_same_references():
+    """Four seconds: it is compiled."""
+    rig = Rig(Axis(), [CartServo()], period=0.004)
+    loop, starts = rig.at_rest([0.0], seed=1)
+    mpc = Mpc(There, period=0.04, elements=20, terminal="lqr")
+    with pytest.raises(
+        ModelError, match=r"loop, starts = rig.at_rest\(q\); Controller\(loop, period=rig.period"
+    ):
+        mpc.run(cast(Any, rig), stop=0.4)
+    wires = {"servo.q": "robot.x.s", "servo.q_ref": "q_ref"}
+    found = mpc.run(Controller(loop, period=rig.period, starts=starts), stop=0.4, wires=wires)
+    assert found["servo.q"][-1] == pytest.approx(0.01, abs=5e-5)
+    references = np.append(np.zeros(5), found.record["applied.q_ref"])
+    run = rig.run(references[:, None], seed=1)
+    np.testing.assert_allclose(run["x.s"][5:], found.record["robot.x.s"], rtol=0, atol=1e-6)
 
 
 CART = dict(cart=exact_cart(0.05), metres=exact_cart(0.05, "m"), other=exact_cart(0.05, given="push"))

@@ -42,8 +42,13 @@ def check_problem(plant: Any, wires: Any) -> None:
     kind = plant if isinstance(plant, type) else type(plant)
     if plant is not None and not issubclass(kind, Optimization):
         source = f"'{plant}'" if isinstance(plant, (str, os.PathLike)) else "plant"
-        words = f"expected a problem, or a plant that runs by itself: Controller({source}, period=...) of gantrytau_fmu"
-        raise ModelError(f"{words}.controller, for FMUs and models", place="run", found=Given("plant", plant))
+        words = f"Controller({source}, period=...) of gantrytau_fmu.controller, for FMUs and models"
+        if hasattr(plant, "at_rest"):  # a Rig
+            words = (
+                "of a rig: loop, starts = rig.at_rest(q); Controller(loop, period=rig.period, starts=starts)"
+            )
+        words = f"expected a problem, or a plant that runs by itself: {words}"
+        raise ModelError(words, place="run", found=Given("plant", plant))
     if wires:
         words = "found some and a problem as plant, expected them with one that runs by itself: names are the same here"
         raise ModelError(words, place="run", argument="wires")
