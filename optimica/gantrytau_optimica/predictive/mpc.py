@@ -20,7 +20,9 @@ from gantrytau_optimica.predictive.compiled_horizon import compiled_horizon
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
 from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, Loaded, failed
 from gantrytau_optimica.predictive.loop.closed_loop import ClosedLoop
+from gantrytau_optimica.predictive.loop.driven_loop import driven_loop
 from gantrytau_optimica.predictive.loop.model_loop import PARTS, model_loop
+from gantrytau_optimica.predictive.loop.plant import DrivenPlant, check_problem
 from gantrytau_optimica.predictive.loop.sensors import Sensors
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
@@ -235,7 +237,7 @@ class Mpc:
 
     def run(
         self,
-        plant: Optimization | type[Optimization] | None = None,
+        plant: Optimization | type[Optimization] | DrivenPlant | None = None,
         *,
         stop: float,
         start: Mapping[str, Any] | None = None,
@@ -243,18 +245,24 @@ class Mpc:
         seed: int = 0,
         estimator: StateEstimator | None = None,
         after: ClosedLoop | None = None,
+        wires: Mapping[str, str] | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
-        plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
-        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
+        plant: the same problem with other parameters, by default with the same, or a `Controller` of gantrytau_fmu, which
+        runs an FMU, any model or hardware from its own start; wires: input or state -> name in it. stop: s; start: state ->
+        value, by default the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator:
+        a MovingHorizon or an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by
+        these names.
         after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
         """
         sensors = Sensors(self, noise or {}, seed, estimator)
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
+        if isinstance(plant, DrivenPlant):
+            return driven_loop(self, plant, stop, sensors, wires, start or after)
+        check_problem(plant, wires)
         own = plant is None
         other = (self.built, HorizonStages(self.built.problem, step)) if own else staged(plant, step)[:2]
         return model_loop(self, other, stop, start or {}, sensors, after)
