@@ -14,8 +14,8 @@ import numpy as np
 
 from gantrytau import GantryTauError, ModelError, load_modelica, simulate
 from gantrytau.results.run_statistics import INTEGRATION
+from gantrytau.results.tube import leaves
 from tests.library_results.references import Example, Reference, references
-from tests.library_results.tube import leaves
 
 TOLERANCE = 1e-6  # of an experiment that says none
 PASSED, LEFT, REFUSED, NOT_RUN, NO_REFERENCE = "passed", "left", "refused", "not run", "no reference"
@@ -96,7 +96,7 @@ def _compared(results: Sequence[Any], reference: Reference) -> tuple[str, str, f
             unknown.append(name)
             continue
         values = [np.broadcast_to(np.asarray(one[name], dtype=float), one["time"].shape) for one in results]
-        when = leaves(at, np.concatenate(values)[order], found["time"], found[name])
+        when, _ = leaves(at, np.concatenate(values)[order], found["time"], found[name])
         if when.size:
             left.append((when[0], name))
             last = max(last, when[-1])
