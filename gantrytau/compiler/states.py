@@ -57,9 +57,8 @@ def choose_states(
     for level in range(1, max(indexed.counts, default=0) + 1):
         rows = [i for i, count in enumerate(indexed.counts) if count >= level]
         columns = [n for n in allowed if indexed.orders[n] >= level]
-        chosen, conditioned = _basis(
-            indexed, reduced, sample, preference, wanted, rows, columns, allowed, title
-        )
+        matrix = _constraints(indexed, reduced, sample, rows, columns, allowed)
+        chosen, conditioned = _basis(reduced, matrix, preference, wanted, rows, columns, title)
         condition = max(condition, conditioned)
         dummies |= {derivative_name(n, indexed.orders[n] - level) for n in chosen}
         allowed = chosen
