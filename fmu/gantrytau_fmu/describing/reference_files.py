@@ -7,7 +7,7 @@ tools that know neither take the FMU as a plain one (FMI 3.0.2, section 2.5.1: `
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -31,11 +31,12 @@ def reference_members(fmu: FmuDescription, reference: Result, equations: str) ->
     """
     shown = [v.name for v in fmu.variables if v.causality in ("input", "output")]
     members = {_RESULTS: _csv(reference, shown)}
-    related = [_related(fmu, members, _RESULTS, "text/csv", "result", "Reference results")]
+    words, jumps = "Reference results", {"jumps": _jumps(fmu, reference)}
+    related = [_related(fmu, members[_RESULTS], _RESULTS, "result", words, jumps)]
     if equations:
         members[_EQUATIONS] = equations.encode()
         words = "Equations of the DAE as Base Modelica"
-        related.append(_related(fmu, members, _EQUATIONS, "text/modelica", "model", words))
+        related.append(_related(fmu, members[_EQUATIONS], _EQUATIONS, "model", words, {}))
         entry = element("Equations", {"language": "base-modelica", "source": "equations.mo"})
         words = "Draft, no released standard: equations of the DAE that an FMU computes."
         members[f"{DRAFT}fmi-ls-manifest.xml"] = _manifest("fmiDae", DRAFT, "0.1.0-draft", words, [entry])
@@ -79,13 +80,21 @@ def _column(reference: Result, name: str, place: str) -> np.ndarray:
     return reference[name]
 
 
+def _jumps(fmu: FmuDescription, reference: Result) -> str:
+    """The rows, from 0, before which something is sampled or switched: an importer may see it a step later."""
+    steps = {v.name for v in fmu.variables if v.variability == "discrete" and v.name in reference}
+    changes = [np.diff(reference[name]) != 0 for name in sorted(steps | reference.held)]
+    return " ".join(map(str, np.flatnonzero(np.any([np.diff(reference.time) == 0, *changes], axis=0)) + 1))
+
+
 def _related(
-    fmu: FmuDescription, members: dict[str, bytes], name: str, kind: str, role: str, words: str
+    fmu: FmuDescription, content: bytes, name: str, role: str, words: str, more: Mapping[str, str]
 ) -> str:
     """The entry of a file, with what tells later whether it, or the FMU, has been changed."""
-    origin = element("origin", {"token": fmu.token, "sha256": digest(members[name])})
+    origin = element("origin", {"token": fmu.token, "sha256": digest(content), **more})
     note = parent("Annotations", [element("Annotation", {"type": ORIGIN}, origin)])
     source = name.removeprefix(FOLDER) if name.startswith(FOLDER) else name.replace("extra/", "../", 1)
+    kind = "text/csv" if role == "result" else "text/modelica"
     return element("Related", {"type": kind, "source": source, "role": role, "description": words}, note)
 
 

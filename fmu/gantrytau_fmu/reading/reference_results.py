@@ -5,10 +5,11 @@ the file, as was customary before.
 """
 
 import posixpath
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -23,6 +24,7 @@ from gantrytau_fmu.reading.safety import Archive, open_archive
 
 _AGAIN = "ask its author for it again"
 _ROLES = ("result", "model")
+_ABSOLUTE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")  # a URI, which is left alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,8 @@ class ReferenceResults:
     """Results that an FMU has to reproduce.
 
     name: of the file; own: written by this toolkit, and so of all inputs and outputs; time: (n,) in s, not decreasing;
-    values: of outputs by name, (n,); inputs: by name their times and values.
+    values: of outputs by name, (n,); inputs: by name their times and values; jumps: rows before which something is sampled
+    or switched, of own results.
     """
 
     name: str
@@ -38,6 +41,7 @@ class ReferenceResults:
     time: np.ndarray
     values: Mapping[str, np.ndarray]
     inputs: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    jumps: tuple[int, ...] = ()
 
 
 def references_of(fmu: FmuFile) -> Iterator[ReferenceResults | FmuFinding]:
@@ -49,7 +53,7 @@ def references_of(fmu: FmuFile) -> Iterator[ReferenceResults | FmuFinding]:
     beside, inputs = (fmu.path.with_name(f"{fmu.path.stem}_{end}.csv") for end in ("ref", "in"))
     if beside.is_file():
         contents = [file.read_bytes() for file in (beside, inputs) if file.is_file()]
-        yield from _read(fmu, beside.name, False, *contents)
+        yield from _read(fmu, beside.name, None, *contents)
 
 
 def _listed(archive: Archive, fmu: FmuFile) -> Iterator[ReferenceResults | FmuFinding]:
@@ -59,7 +63,7 @@ def _listed(archive: Archive, fmu: FmuFile) -> Iterator[ReferenceResults | FmuFi
         yield fault(f"{MANIFEST} begins with '{root.tag}', expected fmiReferences; {_AGAIN}")
     for related in root.iter("Related"):
         source, role = related.get("source", ""), related.get("role", "")
-        if role not in _ROLES or urlsplit(source).scheme:
+        if role not in _ROLES or _ABSOLUTE.match(source):
             continue
         name = posixpath.normpath(posixpath.join(FOLDER, unquote(source)))
         if name not in archive.names:
@@ -71,7 +75,7 @@ def _listed(archive: Archive, fmu: FmuFile) -> Iterator[ReferenceResults | FmuFi
         if origin is not None:
             yield from _changed(name, content, origin, fmu.token)
         if role == "result" and (related.get("type") == "text/csv" or name.endswith(".csv")):
-            yield from _read(fmu, name, origin is not None, content)
+            yield from _read(fmu, name, origin, content)
 
 
 def _changed(name: str, content: bytes, origin: ElementTree.Element, token: str) -> Iterator[FmuFinding]:
@@ -86,7 +90,11 @@ def _changed(name: str, content: bytes, origin: ElementTree.Element, token: str)
 
 
 def _read(
-    fmu: FmuFile, name: str, own: bool, content: bytes, inputs: bytes | None = None
+    fmu: FmuFile,
+    name: str,
+    origin: ElementTree.Element | None,
+    content: bytes,
+    inputs: bytes | None = None,
 ) -> Iterator[ReferenceResults | FmuFinding]:
     """The results in a file, with inputs in the same or in another; else what is wrong."""
     try:
@@ -97,6 +105,10 @@ def _read(
         return
     seen = {k: x for k, x in values.items() if k in fmu.outputs or split_element(k)}
     given = {k: (driven[0], x) for k, x in driven[1].items() if k in fmu.inputs}
+    own = origin is not None
+    jumps = (
+        tuple(int(k) for k in origin.get("jumps", "").split() if re.fullmatch(r"\d{1,9}", k)) if own else ()
+    )
     missing = [k for k in (*fmu.inputs, *fmu.outputs) if own and k not in seen and k not in given]
     if missing:
         more = f" (and {len(missing) - 1} more)" if len(missing) > 1 else ""
@@ -104,7 +116,9 @@ def _read(
             f"{name}: found no column '{missing[0]}'{more}, expected all inputs and outputs; {_AGAIN}"
         )
     elif seen:
-        yield ReferenceResults(name, own, time, {k: x for k, x in seen.items() if k not in given}, given)
+        yield ReferenceResults(
+            name, own, time, {k: x for k, x in seen.items() if k not in given}, given, jumps
+        )
 
 
 def _columns(fmu: FmuFile, name: str, content: bytes) -> tuple[np.ndarray, dict[str, np.ndarray]]:

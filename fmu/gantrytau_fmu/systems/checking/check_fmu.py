@@ -69,7 +69,10 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
         if not tripped and not problem.startswith(_OURS):
             findings.append(FmuFinding("error", problem))
-    references = list(references_of(fmu))
+    try:
+        references = list(references_of(fmu))
+    except ModelError as error:
+        references = [fault(str(error))]
     findings += [one for one in references if isinstance(one, FmuFinding)]
     if run:
         findings += _tried(path, fmu.platforms, timeout)

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from gantrytau_fmu.systems.run_fmu import run_fmu
 
 STEPS = 1000  # of an integrator, whose errors add up: `simulate` allows a 500th of its tolerance for one
 WIDEST = 0.1  # of a signal's range, whatever the tolerance
+HELD = 1e-3  # of an input's range: its change in a step
 LONGEST = 20_000  # steps of a rerun
 SAME = 1e-9  # of the time of the run
 
@@ -27,11 +28,10 @@ def rerun(fmu: FmuFile, reference: ReferenceResults) -> Iterator[FmuFinding]:
     Tube of own results: a thousand times the tolerance of the experiment high, relative to a signal's range; without width,
     save within a step of an event, where a sample or a jump is seen a step later. Results of other tools: 0.2 %.
     """
-    end = float(reference.time[-1])
-    grid = _distance(reference.time)
-    longest = fmu.experiment.step or grid
-    step = grid / math.ceil(grid / longest * (1 - SAME))
+    end, grid = float(reference.time[-1]), _distance(reference.time)
     driven = {name: _driven(*drawn) for name, drawn in reference.inputs.items()}
+    lined = [one for one in driven.values() if isinstance(one, Samples) and one.kind == "linear"]
+    step = _step(fmu, grid, lined, end)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of inputs that nothing drives
@@ -60,6 +60,7 @@ def rerun(fmu: FmuFile, reference: ReferenceResults) -> Iterator[FmuFinding]:
         + f" (later by up to {most:.3g}; {len(left)} of {len(compared)} signals leave)"
         + f", expected {expected:.6g} within {high:g} of its range; the FMU is not what its author ran: get it from there"
         " again, or export it with a reference of these equations"
+        + (", of more points: its inputs are joined by lines" if lined else "")
     )
     yield FmuFinding("error" if reference.own else "warning", f"{reference.name}: {words}")
 
@@ -70,6 +71,19 @@ def _distance(time: np.ndarray) -> float:
     found = max(float(np.median(np.diff(np.unique(time)))), end / LONGEST)
     count = round(end / found)
     return end / count if abs(end / found - count) < SAME * count else found
+
+
+def _step(fmu: FmuFile, grid: float, lined: Sequence[Samples], end: float) -> float:
+    """A step that divides the distance of output times, no longer than the experiment's.
+
+    An FMU that samples holds the inputs of the beginning of a step: they change by 0.1 % of their range in one at most.
+    """
+    parts = grid / (fmu.experiment.step or grid)
+    if any(v.variability == "discrete" and v.real and v.causality != "input" for v in fmu.variables):
+        parts = max(
+            [parts, *(np.abs(np.diff(u.values[:, 0])).max() / np.ptp(u.values) / HELD for u in lined)]
+        )
+    return grid / max(min(math.ceil(parts * (1 - SAME)), math.floor(LONGEST * grid / end)), 1)
 
 
 def _driven(time: np.ndarray, values: np.ndarray) -> Samples | float:
@@ -101,27 +115,27 @@ def _left(
     relative, absolute = _height(fmu, reference)
     variable = fmu.by_name.get(name)
     nominal = (variable and variable.nominal) or 1.0
-    time, expected, wide = reference.time, reference.values[name], None
-    if reference.own:
-        small = SAME * time[-1]
-        known = np.abs(time - step * np.round(time / step)) <= small  # at points of the rerun
-        twice, jumps = np.diff(time) == 0, _jumps(fmu, reference)
-        kept = known | ~(np.append(twice, False) | np.insert(twice, 0, False))
-        kept[-1] &= not jumps[-1]  # a sample at the end would be seen after it
-        wide = np.where(_near(time, jumps, step + small) | ~known, step + small, small)[kept]
-        time, expected = time[kept], expected[kept]
-    return leaves(
-        run.time, run[name], time, expected, nominal, relative=relative, absolute=absolute, wide=wide
+    time, expected, policy = (
+        reference.time,
+        reference.values[name],
+        {"relative": relative, "absolute": absolute},
     )
-
-
-def _jumps(fmu: FmuFile, reference: ReferenceResults) -> np.ndarray:
-    """Whether there is an event between two rows: they are of one time, or a discrete variable changes, (n - 1,)."""
-    found = np.diff(reference.time) == 0
-    for name, values in reference.values.items():
-        if name in fmu.by_name and fmu.by_name[name].variability == "discrete":
-            found |= np.diff(values) != 0
-    return found
+    if not reference.own:
+        return leaves(run.time, run[name], time, expected, nominal, **policy)
+    small = SAME * time[-1]
+    known = np.abs(time - step * np.round(time / step)) <= small  # at points of the rerun
+    twice = np.diff(time) == 0
+    jumps = twice | np.isin(np.arange(1, time.size), reference.jumps)
+    kept = known | ~(np.append(twice, False) | np.insert(twice, 0, False))
+    kept[-1] &= not jumps[-1]  # a sample at the end would be seen after it
+    near = _near(time, jumps, step + small) | ~known
+    wide = np.where(near, step + small, small)[kept]
+    when, by = leaves(run.time, run[name], time[kept], expected[kept], nominal, **policy, wide=wide)
+    # behind a jump that is seen a step later, the signal has gone on by then
+    close = [np.abs(run.time - t) <= step + small for t in when]
+    later = by > np.array([np.ptp(run[name][one]) if one.any() else 0.0 for one in close])
+    left = later | ~np.isin(when, time[near])
+    return when[left], by[left]
 
 
 def _near(time: np.ndarray, jumps: np.ndarray, step: float) -> np.ndarray:
