@@ -72,6 +72,13 @@ def component_of(call: tree.Call, reader: Any) -> Any:
     return reader.value(replace(call.function, parts=tuple(path)))
 
 
+def subscripts_at_end(e: tree.Expression) -> tuple[tree.Expression, tuple[tree.Expression, ...]] | None:
+    """An array and the subscripts at its end; None for all else."""
+    if not isinstance(e, tree.ComponentReference) or not e.parts[-1][1]:
+        return None
+    return replace(e, parts=(*e.parts[:-1], (e.parts[-1][0], ()))), e.parts[-1][1]
+
+
 def declared_shape(e: tree.Expression, reader: Any) -> tuple[int, ...] | None:
     """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
     name = dotted(e)

@@ -72,13 +72,14 @@ def outcome_of(reference: Reference, library: Path) -> Outcome:
 def _run(model: Any, reference: Reference, stop: float | None) -> Any:
     said = reference.settings
     if isinstance(reference, Example):
-        return simulate(model)
+        return simulate(model, singular="cross")
     return simulate(
         model,
         start=said.get("StartTime", 0.0),
         stop=stop,
         tolerance=said.get("Tolerance", TOLERANCE),
         points=reference.points,
+        singular="cross",
     )
 
 

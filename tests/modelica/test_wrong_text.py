@@ -57,6 +57,11 @@ WRONG = (  # text of a model, line and column, words
 FUNCTION = "function f\n  input Real u[2];\n  output Integer n = integer(u[1]);\nend f;\n"
 MEANINGS = (  # where a wrong model would run: text, line and column, words
     (
+        "model M\n  Real v[2] = {1, time};\n  Real y[2] = v ^ 2;\nend M;",
+        "3:15",
+        "found \\[2\\] and a scalar beside '\\^', expected a square matrix",
+    ),
+    (
         "model M\n  Real x = sin(Integer(time));\nend M;",
         "2:16",
         "found Real in Integer\\(\\), expected a value of an enumeration",

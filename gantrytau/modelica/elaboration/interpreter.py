@@ -24,6 +24,7 @@ from gantrytau.modelica.references import (
     component_of,
     declared_shape,
     function_name,
+    subscripts_at_end,
     whole_name,
 )
 
@@ -328,10 +329,8 @@ class Interpreter:
         quiet = name == "noEvent" or (name == "smooth" and self.value(e.arguments[0]) > 0)
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
-            items = list(inner._iterated(e.arguments[0], e.iterators))
-            if name == "array":
-                return values.array(items)
-            return values.called(name, [np.ravel(values.array(items))], {})
+            found = values.array(list(inner._iterated(e.arguments[0], e.iterators)))
+            return found if name == "array" else values.called(name, [np.ravel(found)], {})
         if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
@@ -342,6 +341,10 @@ class Interpreter:
         if name == "getInstanceName":
             return self.members.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
+        if name == "pre" and before and (at := subscripts_at_end(e.arguments[0])):
+            whole = self.value(replace(e, arguments=at[:1]))
+            if any(map(self.varies, at[1], values.all_sizes(whole))):
+                return self.indexed(whole, at[1])  # their values now, of what was before
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
         if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):

@@ -56,7 +56,6 @@ times the steps, that holds 1e-3 m or takes a minute, and its processor time."""
             "steps": "steps",
             "translate": "translate, s",
             "simulate": "simulate, s",
-            "independent": "other equations, s",
             "exudyn": "exudyn",
         },
     ),
