@@ -32,10 +32,9 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
-from gantrytau_optimica.predictive.staged_problem import staged
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState
-from gantrytau_optimica.predictive.unknowns import named_values
+from gantrytau_optimica.predictive.unknowns import named_values, staged
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
@@ -161,7 +160,7 @@ class Mpc:
             x, reached = self._later(x, t)
             t += self.period
         before = self._plan
-        found, wanted = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
+        found, near = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
         late = before is not None and time.perf_counter() - begin > self.deadline
         kept = found.plan
         if before is not None and (late or not found.solved):
@@ -177,7 +176,7 @@ class Mpc:
             "failed": not found.solved,
             "late": late,
             "lost": lost,
-            "not converged": wanted and not found.stands,
+            "not converged": not near,
             "solved": True,
         }
         self.status = next(word for word, holds in words.items() if holds)
@@ -186,9 +185,9 @@ class Mpc:
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[Iterated, bool]:
-        """The plan from a state (nx,), and whether it was to converge.
+        """The plan from a state (nx,), and whether it is as near to converged as wanted.
 
-        A plan that cannot go on, or is no motion of the model, is made anew as the first one.
+        A plan that cannot go on, or is no motion of the model, is made anew as the first one, without Ipopt.
         """
         prepared, self._prepared = self._prepared, None
         if self._plan is not None:
@@ -200,19 +199,16 @@ class Mpc:
             # how far the unknowns are from solving their equations, beside what they are
             near = loaded is not None and loaded.missed < 1.0 + np.abs(plan.w).max()
             if near and (found := self._newton.improved(plan, loaded, x, self.iterations)).solved:
-                return found, self._converged
-        return self._begun(self._first(x, t), x), True
+                return found, found.stands or not self._converged
+        found = self._begun(self._first(x, t), x)
+        return found, found.stands or (found.near and not self._converged)
 
     def _begun(self, first: PlannedMotion, x: np.ndarray) -> Iterated:
-        """The plan from a first one: full steps, and where these do not converge, steps of such lengths that they do."""
-        found = self._newton.improved(first, self._newton.load(first), x, MOST)
-        if self._plan is None and found.unbounded:
-            checks.check_plan(self.stages, found.plan, True)
-        if not found.stands:
-            again = self._newton.globalised(first, x)
-            found = again if again.solved else found
-        if self._plan is None and found.solved:
-            checks.check_plan(self.stages, found.plan, False)
+        """The plan from a first one."""
+        initial = self._plan is None
+        found = self._newton.begun(first, x, MOST, initial)
+        if initial and (found.solved or found.unbounded):
+            checks.check_plan(self.stages, found.plan, found.unbounded)
         return found
 
     def prepare(self) -> None:
