@@ -76,14 +76,14 @@ def _inside(placed: Placed, modes: dict[str, Placed]) -> Any:
     """The condition that a mode is within the mode of another one that it names, None for one that is within none."""
     one, above = placed, []
     while (told := one.declaration.within) is not None:
-        outer, _, name = told.rpartition(".")
+        outer = told.rpartition(".")[0]
         full = f"{placed.path}.{outer}" if placed.path else outer
         if full not in modes or full in [placed.name, *above]:
-            others = {n: p for n, p in modes.items() if n not in (placed.name, *above)}
-            beside = [n.rpartition(".")[2] for n, p in others.items() if p.path == placed.path]
+            free = [p for n, p in modes.items() if p.path == placed.path and n not in (placed.name, *above)]
+            beside = [f", as '{p.name.rpartition('.')[2]}.{p.declaration.names[0]}'" for p in free]
             raise ModelError(
-                f"{one.name}: found within={told!r}, expected a mode of another one beside it that is not within this one, "
-                f"as '{beside[0] if beside else 'phase'}.{name}'"
+                f"{one.name}: found within={told!r}, expected a mode of another one beside it that is not within this "
+                f"one{beside[0] if beside else '; declare one'}"
             )
         one = modes[full]
         above.append(full)
