@@ -34,7 +34,7 @@ def windows(count: int, times: np.ndarray) -> np.ndarray:
 
 
 def governor(times: np.ndarray) -> np.ndarray:
-    """A05 by Lagrange's equations: angles of shaft and arms, and the slide, which is found: (times, 1) in m."""
+    """A05 by Lagrange's equations: angles of shaft and arms, and the slide, which is found: (times, 3) in m."""
     q, v = ca.SX.sym("q", 3), ca.SX.sym("v", 3)
     tilt, height = q[1], q[2]
     across, along = 0.3 * (1 + 1e-4) / 12, 0.3 * 2e-4 / 12
@@ -50,7 +50,7 @@ def governor(times: np.ndarray) -> np.ndarray:
     rates = _lagrange(q, v, moving / 2, lifted, forces)
     start = [0.0, np.pi / 3, 0.5, 2 * np.pi, 0.0, 0.0]
     found = solve_ivp(rates, (0, times[-1]), start, "Radau", times, rtol=1e-11, atol=1e-12)
-    return found.y[2][:, None]
+    return np.outer(found.y[2], [0.0, 0.0, 1.0])
 
 
 def _lagrange(

@@ -15,7 +15,7 @@ from tests.classics.row import Row
 
 KEPT = Path(__file__).parents[2] / "notebooks" / "site" / "classics.toml"
 HEAD = "# Written by `make classics`: what became of the problems by which the fields judge themselves, by family.\n"
-PACKAGES = ("gantrytau", "casadi", "scipy", "scikit-sundae", "rockit-meco")
+PACKAGES = ("gantrytau", "casadi", "scipy", "scikit-sundae", "rockit-meco", "exudyn")
 
 
 def print_family(family: str, rows: Mapping[str, Row]) -> None:

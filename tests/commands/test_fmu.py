@@ -98,7 +98,17 @@ def test_options_arrive(run, asked, cart, tmp_path):
         "x",
     ]
     arguments += ["--find", "f,v", "--find", "der(v)", "--states", "v", "--tolerance", "1e-7", "--no-sources"]
-    arguments += ["--stop", "2", "--step", "0.5", "--description", "a cart", "--author", "A. Author"]
+    arguments += [
+        "--stop",
+        "2",
+        "--step",
+        "0.5",
+        "--reference",
+        "--description",
+        "a cart",
+        "--author",
+        "A. Author",
+    ]
     arguments += ["--copyright", "2026 A. Author", "--license", "MIT", "--model-version", "1.2"]
     found = run("fmu", "export", f"{cart}:Cart", "--to", tmp_path / "cart.fmu", *arguments)
     assert found.exit_code == 0, found.output
@@ -112,6 +122,7 @@ def test_options_arrive(run, asked, cart, tmp_path):
         "find": ("f", "v", "der(v)"),
         "states": ("v",),
         "tolerance": 1e-7,
+        "reference": True,
         "build": Build(
             description="a cart",
             author="A. Author",
@@ -136,6 +147,7 @@ def test_defaults_arrive(run, asked, cart, tmp_path):
         "find": (),
         "states": None,
         "tolerance": 1e-6,
+        "reference": False,
         "build": Build(),
     }
 

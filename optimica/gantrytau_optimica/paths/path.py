@@ -392,3 +392,14 @@ class Way(Model):
         yield self.r == self.path(self.s)
         yield self.v == der(self.s)
         yield self.a == der(self.v)
+
+    def errors(self, r: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Contouring error (3,), across the path, and lag error, along it, in m, of a place r (3,) that is to be here.
+
+        For costs of a controller that chooses its own progress (Lam, Manzie, Good, Model predictive contouring control, CDC
+        2010).
+        """
+        place = self.path(self.s)
+        tangent = ca.jacobian(place, self.s)
+        lag = ca.dot(tangent, place - r)
+        return r - place + tangent * lag, lag

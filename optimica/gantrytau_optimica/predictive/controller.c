@@ -486,14 +486,14 @@ static int mpc_later(controller_state *it, double *x, double t) {
     return change < 1e-10;
 }
 
-/* One iteration of Gauss and Newton from state x at time t; the largest change of an input, below 0 without solution. */
-static double mpc_iterate(controller_state *it, const double *x, double t) {
+/* The horizon from time t linearised at the plan, its program loaded; 0 where equations are singular. */
+static int mpc_load(controller_state *it, double t) {
     mpc_work *work = &it->work;
-    double first[NQ] = {0}, o[NU], change = 0;
-    int i, j, k, m;
+    double o[NU];
+    int i, j, k;
     FOR(k, N) {
         FOR(i, NU) o[i] = (k ? it->plan.u[k - 1][i] : it->applied[i]) - it->plan.u[k][i];
-        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, it->known, &work->linear)) return -1;
+        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, it->known, &work->linear)) return 0;
         FOR(i, NW) FOR(j, 1 + NV) work->unknowns[k][i][j] = work->linear.T[i / (NX + NZ)][i % (NX + NZ)][j];
         mpc_assemble(&work->stages[k], k, &work->linear, it->plan.w[k] + NX + NZ, it->plan.x[k + 1], it->plan.u[k], o);
     }
@@ -502,13 +502,21 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         work->end_P[i][j] = mpc_rest_P[i][j];
         work->end_p[i] += mpc_rest_P[i][j] * (it->plan.x[N][j] - mpc_rest_x[j]);
     }
+    return 1;
+}
+
+/* The plan changed by the solution of the loaded program from state x; the largest change of an input or state, below 0 without solution. */
+static double mpc_change(controller_state *it, const double *x) {
+    mpc_work *work = &it->work;
+    double first[NQ] = {0}, change = 0;
+    int i, j, k, m;
     FOR(i, NX) first[i] = x[i] - it->plan.x[0][i];
     if (!mpc_program(work, first)) return -1;
     for (k = N - 1; k >= 0; k--) {
         const mpc_stage *s = &work->stages[k];
         double by[1 + NV];
         by[0] = 1;
-        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i];
+        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i], change = fmax(change, fabs(s->v[i]));
         FOR(i, NU) {
             const double before = k ? it->plan.u[k - 1][i] : it->applied[i];
             by[1 + NX + i] = mpc_chosen[k] ? s->v[NQ + i] : s->v[NX + i] + before - it->plan.u[k][i];
@@ -517,7 +525,7 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         FOR(m, NW) FOR(j, 1 + NV) it->plan.w[k][m] += work->unknowns[k][m][j] * by[j];
         FOR(i, NU) it->plan.u[k][i] += by[1 + NX + i];
     }
-    FOR(i, NX) it->plan.x[N][i] += work->end_v[i];
+    FOR(i, NX) it->plan.x[N][i] += work->end_v[i], change = fmax(change, fabs(work->end_v[i]));
     return change;
 }
 
@@ -549,7 +557,7 @@ void controller_step(controller_state *state, const controller_real *given, cont
     memcpy(kept, it->plan.u[0], sizeof kept);
     it->before = it->plan;
     if (solved) FOR(turn, begun ? MPC_ITERATIONS : MPC_FIRST) {
-        change = mpc_iterate(it, x, t);
+        change = mpc_load(it, t) ? mpc_change(it, x) : -1;
         if (change < MPC_STANDS) break;
     }
     solved &= change >= 0;

@@ -57,11 +57,11 @@ class PlannedMotion:
     u: np.ndarray
     t: float
 
-    def changed(self, linear: Linear, found: Found) -> "PlannedMotion":
-        """The plan after a step of Gauss-Newton's method."""
+    def changed(self, linear: Linear, found: Found, share: float = 1.0) -> "PlannedMotion":
+        """The plan after a step of Gauss-Newton's method, or a share of it."""
         v = np.concatenate([np.ones((len(self.u), 1)), found.x[:-1], found.u], axis=1)
-        w = self.w + np.einsum("nij,nj->ni", linear.w, v)
-        return PlannedMotion(self.x + found.x, w, self.u + found.u, self.t)
+        w = self.w + share * np.einsum("nij,nj->ni", linear.w, v)
+        return PlannedMotion(self.x + share * found.x, w, self.u + share * found.u, self.t)
 
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
@@ -107,9 +107,16 @@ def guessed_plan(
 
 
 def motion_result(
-    built: Built, stages: HorizonStages, motion: PlannedMotion, period: float, title: str
+    built: Built,
+    stages: HorizonStages,
+    motion: PlannedMotion,
+    period: float,
+    title: str,
+    ahead: float = 0.0,
+    told: Mapping[str, np.ndarray] | None = None,
 ) -> Result:
-    """All variables of a model at the samples of a motion, its inputs held.
+    """All variables of a model at the samples of a motion, its inputs held; those of `ahead` s later than each sample.
+    told: variables that are known from elsewhere.
 
     Algebraic variables are those at the end of the period before, with its inputs.
     """
@@ -123,8 +130,9 @@ def motion_result(
     symbols = [ca.vertcat(*(s.symbol for s in phase.signals)), stages.problem.time]
     symbols.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
     named = ca.Function("variables", symbols, [ca.densify(built.expressed(names))])
-    values = np.asarray(named(signals.T, times[None, :], stages.course_values(times)))
+    later = times + ahead
+    values = np.asarray(named(signals.T, later[None, :], stages.course_values(later)))
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
     own["held"] = [s.name for s in phase.inputs]
-    return Result(times, dict(zip(names, values, strict=True)), **own)
+    return Result(times, dict(zip(names, values, strict=True)) | dict(told or {}), **own)
