@@ -150,9 +150,9 @@ def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Functi
     return kernel_for(function, calls, wait).function
 
 
-def library(source: str, level: str = "-O3") -> Path | None:
+def library(source: str) -> Path | None:
     """A shared library of C, which is compiled now unless it is in the cache; None where it cannot be."""
-    command, folder = _command(level), kernel_folder()
+    command, folder = _command("-O3"), kernel_folder()
     if command is None or folder is None:
         return None
     key = _key(source, command)

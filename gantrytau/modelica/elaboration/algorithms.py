@@ -276,7 +276,13 @@ def called_class(
     mapped = next((n for n, one in given.items() if not record and is_longer(inputs[n], one)), None)
     if mapped is not None:
         longer = {n for n, one in given.items() if is_longer(inputs[n], one)}
-        count = range(len(given[mapped]))
+        counts = {len(given[n]) for n in longer}
+        if len(counts) > 1:
+            found = " and ".join(values.size_words(given[n]) for n in inputs if n in longer)
+            raise ModelError(
+                f"found arrays of the sizes {found} for scalars of {scope.name}, expected one size"
+            )
+        count = range(*counts)
         all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
         each = [called_class(scope, (), one, beyond, known) for one in all_given]
         return values.array(each)

@@ -14,7 +14,7 @@ from gantrytau_optimica.predictive.plan import PlannedMotion
 from gantrytau_optimica.predictive.stages import MATRIX, NODES, WEIGHTS, HorizonStages
 from gantrytau_optimica.predictive.terminal import Terminal
 
-MOST = 500  # iterations of Ipopt
+MOST = 300  # iterations of Ipopt
 OPTIONS = {
     "print_time": False, "error_on_fail": False,
     "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MOST, "bound_relax_factor": 0.0, "mu_strategy": "adaptive"},

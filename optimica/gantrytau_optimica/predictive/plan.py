@@ -113,8 +113,10 @@ def motion_result(
     period: float,
     title: str,
     ahead: float = 0.0,
+    told: Mapping[str, np.ndarray] | None = None,
 ) -> Result:
     """All variables of a model at the samples of a motion, its inputs held; those of `ahead` s later than each sample.
+    told: variables that are known from elsewhere.
 
     Algebraic variables are those at the end of the period before, with its inputs.
     """
@@ -133,4 +135,4 @@ def motion_result(
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
     own["held"] = [s.name for s in phase.inputs]
-    return Result(times, dict(zip(names, values, strict=True)), **own)
+    return Result(times, dict(zip(names, values, strict=True)) | dict(told or {}), **own)

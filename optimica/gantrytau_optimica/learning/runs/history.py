@@ -112,11 +112,6 @@ class History(Record):
         return self._relative(self.error)
 
     @property
-    def joint_relative(self) -> np.ndarray:
-        """The same of the joints, (K + 1, n)."""
-        return self._relative(self.joint_error)
-
-    @property
     def tool_relative(self) -> np.ndarray:
         """The same of the measured tool, (K + 1, 3); NaN of axes in which it does not move."""
         found = self._relative(self.tool_error)

@@ -41,7 +41,8 @@ class ClosedLoop(Record):
 
     result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
     its steps; cost: the integral of the problem's integrand along the motion; estimates: what an estimator gave at each
-    sample but the last, by name; parameters: of the plant. plans: at each sample but the last the plan made there, name ->
+    sample but the last, by name; parameters: of the plant, or, if it does not tell them, of
+    the controller's model. plans: at each sample but the last the plan made there, name ->
     (samples, elements + 1), of states and inputs; planned: all variables at the ends of these plans, at the samples.
     record: of a plant that runs by itself, what it returned.
     """
