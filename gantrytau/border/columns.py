@@ -292,9 +292,8 @@ def split_heading(heading: str) -> tuple[str, str | None]:
     if found is None:
         return heading.strip(), None
     text = (found["square"] or found["round"]).strip()
-    sure = bool(
-        found["space"] and found["square"]
-    )  # in any other place it is a unit only if there is such a unit
+    # in any other place it is a unit only if there is such a unit
+    sure = bool(found["space"] and found["square"])
     if not sure and ((found["round"] and not found["space"]) or text.isdigit() or not _is_unit(text)):
         return heading.strip(), None
     return found["name"], text

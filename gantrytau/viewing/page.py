@@ -17,19 +17,8 @@ from gantrytau.viewing.solids import COLOURS, Solid, extent, ghosts, solids
 from gantrytau.whole_files import replacing
 
 SIDES = 24  # of a cone
-OTHERS = (
-    ".pdf",
-    ".png",
-    ".svg",
-    ".jpg",
-    ".jpeg",
-    ".gif",
-    ".mp4",
-    ".webm",
-    ".csv",
-    ".nc",
-    ".json",
-)  # files that no page is
+# files that no page is
+OTHERS = (".pdf", ".png", ".svg", ".jpg", ".jpeg", ".gif", ".mp4", ".webm", ".csv", ".nc", ".json")
 GHOST = 0.35  # opacity of where a controller plans to be
 AMBIENT = 2.0  # of the light that comes from everywhere, beside that which casts shadows
 PARTS = ("bar", "ball", "body", "drive", "ground")  # what turns red at a limit

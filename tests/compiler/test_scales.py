@@ -144,9 +144,8 @@ def test_a_pendulum_of_any_size_swings_alike_on_a_rod_that_does_not_yield(size):
     at = dict(x=Start(0.8 * size), y=Start(-0.6 * size), v_x=Start(0.0), v_y=Start(0.0))
     swing = simulate(Pendulum(L=size, **at), stop=2 * math.sqrt(size), points=30)
     assert np.abs(np.hypot(swing["x"], swing["y"]) / size - 1).max() < 1e-11
-    assert swing.final("x") / size == pytest.approx(
-        0.76539, abs=5e-3
-    )  # in metres; small ones at the default tolerance
+    # in metres; small ones at the default tolerance
+    assert swing.final("x") / size == pytest.approx(0.76539, abs=5e-3)
 
 
 @pytest.mark.parametrize("size", [1e-8, 1e-6, 1.0])

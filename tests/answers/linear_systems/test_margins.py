@@ -68,9 +68,8 @@ def test_margins_are_those_of_python_control(name, period):
 
 
 def test_margins_of_a_servo_are_those_of_the_textbook():
-    found = StateSpace(
-        [[0, 1, 0], [0, 0, 1], [0, -2, -3]], [0, 0, 1], [2, 0, 0]
-    ).margins()  # 2 / s (s + 1) (s + 2)
+    # 2 / s (s + 1) (s + 2)
+    found = StateSpace([[0, 1, 0], [0, 0, 1], [0, -2, -3]], [0, 0, 1], [2, 0, 0]).margins()
     assert found.gain == (0.0, pytest.approx(3.0))
     assert found.gain_frequencies[1] == pytest.approx(np.sqrt(2) / (2 * np.pi))
     w = 2 * np.pi * found.phase_frequency

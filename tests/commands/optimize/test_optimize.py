@@ -35,9 +35,8 @@ def test_the_fastest_motion_takes_two_seconds(run, answer, move):
     assert found["success"] is True
     assert found["status"] == "solved"
     assert found["objective"] == found["final_time"] == found["free"]["final_time"]
-    assert found["final_time"] == pytest.approx(
-        fastest(), abs=1e-5
-    )  # solved to 1e-8, limits relaxed by as much
+    # solved to 1e-8, limits relaxed by as much
+    assert found["final_time"] == pytest.approx(fastest(), abs=1e-5)
     assert found["iterations"] > 0
     assert found["seconds"].keys() == {"build", "solve"}
     assert found["versions"].keys() == {"gantrytau", "casadi", "python"}
@@ -274,9 +273,8 @@ def test_a_problem_of_optimica_text_is_named_by_its_file(run, answer):
     file = Path(__file__).parents[2] / "optimica" / "text" / "problems.mop"
     found = answer("optimize", f"{file}:Problems.Fastest", "--refine", "1e-6", "--set", "finalTime=3")
     assert found["problem"] == "Fastest"
-    assert found["free"]["finalTime"] == pytest.approx(
-        2.2811848, rel=1e-6
-    )  # of van der Pol's equation, converged
+    # of van der Pol's equation, converged
+    assert found["free"]["finalTime"] == pytest.approx(2.2811848, rel=1e-6)
     several = run("optimize", file)
     assert several.exit_code == MISUSE
     assert "several problems (Problems.Box, " in " ".join(several.stderr.split())

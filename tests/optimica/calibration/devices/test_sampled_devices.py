@@ -24,9 +24,8 @@ def test_tracker_has_its_deviations_and_equal_seeds_give_equal_series():
     assert series.unit("range") == "m"
     miss = series["r"] - path.at(series.time, "tool.r")
     expected = np.sqrt(np.diag(tracker.covariance([[3.2, 0.0, 0.0]])[0]))
-    assert miss.std(axis=0) == pytest.approx(
-        expected, rel=0.05
-    )  # 4001 readings: 1.1 %, four and a half times
+    # 4001 readings: 1.1 %, four and a half times
+    assert miss.std(axis=0) == pytest.approx(expected, rel=0.05)
     again = SampledDevice(tracker).measure(path, rate=1000.0, seed=3)
     other = SampledDevice(tracker).measure(path, rate=1000.0, seed=4)
     assert np.array_equal(series["r"], again["r"])

@@ -51,9 +51,8 @@ def disturbed(arm, *, seed: int, size: float = 2e-3):
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_the_thesis_counts_10_24_and_38_parameters(orientation):
     arms = f1_arms(orientation)
-    assert (
-        tuple(arm.count for arm in arms) == COUNTS[orientation]
-    )  # a local rotation has one less than a quaternion
+    # a local rotation has one less than a quaternion
+    assert tuple(arm.count for arm in arms) == COUNTS[orientation]
     assert all(len(set(arm.names)) == arm.count == len(arm.vector) for arm in arms)
 
 
@@ -76,9 +75,8 @@ def test_jacobian_is_that_of_differences(orientation, robot):
         steps = 1e-6 * np.eye(arm.count)
         ends = [[arm.moved(h * step).closure(q, r, R)[0] for h in (1.0, -1.0)] for step in steps]
         differences = np.stack([(after - before) / 2e-6 for after, before in ends], axis=-1)
-        np.testing.assert_allclose(
-            J, differences, atol=1e-8, rtol=0
-        )  # 1e-6 squared, and 1e-16 / 1e-6 by size 10
+        # 1e-6 squared, and 1e-16 / 1e-6 by size 10
+        np.testing.assert_allclose(J, differences, atol=1e-8, rtol=0)
 
 
 @pytest.mark.parametrize("robot", ["D1", "F1"])

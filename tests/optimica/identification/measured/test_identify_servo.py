@@ -58,9 +58,8 @@ def test_what_follows_from_the_printed_servos(exact):
     assert np.allclose(exact.bandwidth, [1.431, 1.394, 1.099], rtol=2e-3)  # which were read off a grid
     gains = np.abs(exact.system.response(exact.bandwidth))
     at_rest = np.abs(exact.system.response([0.0]))[:, :, 0]
-    assert np.allclose(
-        [gains[i, i, i] for i in range(3)], np.diag(at_rest) / np.sqrt(2), rtol=1e-9
-    )  # by the closed form
+    # by the closed form
+    assert np.allclose([gains[i, i, i] for i in range(3)], np.diag(at_rest) / np.sqrt(2), rtol=1e-9)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 2, 5])
