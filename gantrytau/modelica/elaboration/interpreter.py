@@ -134,7 +134,9 @@ class Interpreter:
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
-        step = self.value(e.step) if e.step is not None else 1
+        if isinstance(start, EnumerationValue) and whole_name(e.start).endswith(f".{start.literal}"):
+            return self.value(tree.ComponentReference(e.at, cast(Any, e.start).parts[:-1]))[start - 1 : stop]
+        step = 1 if e.step is None else self.value(e.step)
         if not all(map(values.is_number, (start, stop, step))):
             raise ModelError("found a range of variables, expected one that is known at translation")
         count = int(np.floor((stop - start) / step + 1e-9)) + 1

@@ -39,17 +39,8 @@ class FirstPlan:
             ca.MX.sym(*one) for one in (("x", nx, n + 1), ("w", stages.nw, n), ("u", nu, n), ("e", 1, n))
         )
         courses = len(stages.phase.courses)
-        given = [
-            ca.MX.sym(*one)
-            for one in (
-                ("x0", nx),
-                ("t", 2, n),
-                ("courses", 2 * courses, n),
-                ("before", nu),
-                ("P", nx, nx),
-                ("rest", nx),
-            )
-        ]
+        sizes = ((nx, 1), (2, n), (2 * courses, n), (nu, 1), (nx, nx), (nx, 1))
+        given = [ca.MX.sym(f"given_{k}", *size) for k, size in enumerate(sizes)]
         x0, t, known, before, P, rest = given
         point, parts = stages.merits.map(n), []
         for i in range(2):

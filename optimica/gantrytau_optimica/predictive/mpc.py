@@ -32,10 +32,9 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
-from gantrytau_optimica.predictive.staged_problem import staged
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState
-from gantrytau_optimica.predictive.unknowns import named_values
+from gantrytau_optimica.predictive.unknowns import named_values, staged
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]

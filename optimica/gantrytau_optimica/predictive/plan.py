@@ -63,6 +63,10 @@ class PlannedMotion:
         w = self.w + share * np.einsum("nij,nj->ni", linear.w, v)
         return PlannedMotion(self.x + share * found.x, w, self.u + share * found.u, self.t)
 
+    def without_stages(self) -> "PlannedMotion":
+        """The plan with the unknowns of its last stage alone, to be kept."""
+        return replace(self, w=self.w[-1:].copy())
+
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
         n = len(self.u)

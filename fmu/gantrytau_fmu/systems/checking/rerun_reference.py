@@ -28,6 +28,10 @@ def rerun(fmu: FmuFile, reference: ReferenceResults) -> Iterator[FmuFinding]:
     Tube of own results: a thousand times the tolerance of the experiment high, relative to a signal's range; without width,
     save within a step of an event, where a sample or a jump is seen a step later. Results of other tools: 0.2 %.
     """
+    if "co-simulation" not in {each.kind for each in fmu.interfaces}:
+        words = "not run again: found no interface for Co-Simulation, expected one; export it with that"
+        yield FmuFinding("warning", f"{reference.name}: {words}")
+        return
     end, grid = float(reference.time[-1]), _distance(reference.time)
     driven = {name: _driven(*drawn) for name, drawn in reference.inputs.items()}
     lined = [one for one in driven.values() if isinstance(one, Samples) and one.kind == "linear"]

@@ -98,10 +98,6 @@ class History(Record):
         """What is wanted less what was estimated in run k, (N, m): (7.23) or (7.24)."""
         return self.wanted - self.estimates[k]
 
-    def joint_error(self, k: int = -1) -> np.ndarray:
-        """References of the joints without corrections less measured positions in run k, (N, n): (7.23)."""
-        return self.q_ref[0] - self.q[k]
-
     def tool_error(self, k: int = -1) -> np.ndarray:
         """Reference of the tool less its measured position in run k, (N, 3): (7.24)."""
         return self.reference.r - self.tool[k]

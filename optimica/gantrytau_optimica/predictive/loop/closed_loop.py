@@ -22,11 +22,12 @@ SHOWN = 12  # plans in a figure
 
 @dataclass(frozen=True, eq=False)
 class LoopEnd:
-    """Where a loop with a model ended. controller: its `key`; made: its plans; applied: inputs of the last
-    step; now, waiting: those held, and those that follow; motion: of the plant, scaled; random: state of the noise.
+    """Where a loop with a model ended. controller: its `key`; plan: its last; made: all, without stages; applied: inputs of
+    the last step; now, waiting: those held, and those that follow; motion: of the plant, scaled; random: state of the noise.
     """
 
     controller: tuple[Any, ...]
+    plan: PlannedMotion | None
     made: tuple[PlannedMotion, ...]
     applied: Mapping[str, float]
     now: Mapping[str, float]

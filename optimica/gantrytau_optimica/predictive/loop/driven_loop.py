@@ -93,7 +93,7 @@ class _Law:
             given = mpc.step(state, t)
             self.statuses.append(mpc.status)
             self.states.append([state[name] for name in mpc.states])
-            self.made.append(mpc.planned_motion(np.array(self.states[-1]), t))
+            self.made.append(mpc.planned_motion(np.array(self.states[-1]), t).without_stages())
             mpc.prepare()
             self._now, self._waiting = (self._waiting, given) if mpc.delay else (given, given)
         return {own: self._waiting[name] for name, own in self._given.items()}
