@@ -18,7 +18,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from gantrytau import ModelError
-from gantrytau.modelica import read_tree, tree
+from gantrytau.modelica import read_tree
+from gantrytau.modelica.elaboration.library import version_of
 from tests.library_results.example import NOT_RUN, Outcome, one_line
 from tests.library_results.references import SIGNALS, Example, Reference, examples, references
 from tests.library_results.summary import print_summary, write_summary
@@ -41,15 +42,6 @@ def folder_of(variable: str, holds: str, found: Iterable[Path]) -> Path:
     if next(iter(found), None) is None:
         raise SystemExit(f"library-results: {variable}={given}: found no {holds}, expected them in it")
     return Path(given)
-
-
-def version_of(package: Path) -> str:
-    """The version that a package says it has; "" where it says none."""
-    for one in read_tree(package).classes[0].annotation or ():
-        if isinstance(one, tree.Argument) and one.name == "version" and one.modification is not None:
-            value = one.modification.value
-            return value.text.strip('"') if isinstance(value, tree.StringLiteral) else ""
-    return ""
 
 
 def digest(files: Iterable[Path]) -> str:
@@ -106,7 +98,7 @@ def main() -> int:
     versions = {}
     for name in dict.fromkeys(one.name.partition(".")[0] for one in asked):
         try:
-            versions[name] = version_of(library / name / "package.mo")
+            versions[name] = version_of(read_tree(library / name / "package.mo").classes[0])
         except ModelError as error:
             raise SystemExit(f"library-results: {name}: {one_line(error)}") from error
         if versions[name] != VERSION and not isinstance(asked[0], Example):

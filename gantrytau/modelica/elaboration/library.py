@@ -243,8 +243,21 @@ def package_in(folder: Path, around: ClassScope) -> ClassScope:
             )
         )
     made = ClassScope(definition, found.source, around)
-    made.more = lambda name: _in_folder(folder, name, made) or _renamed(made, name)
+    made.more = lambda name: (
+        _in_folder(folder, name, made) or _renamed(made, name) or _absent(folder, name, made)
+    )
     return made
+
+
+def _absent(folder: Path, name: str, package: ClassScope) -> None:
+    """ModelError if the order of a package names a class that is not there: the copy of a library is not whole."""
+    order = folder / "package.order"
+    if order.is_file() and name in order.read_text("utf-8-sig").split() and name not in package.elements:
+        raise ModelError(
+            f"found no {name}.mo and no folder {name} with package.mo, expected one, as package.order names it: this copy "
+            "of the package is not whole",
+            place=str(folder),
+        )
 
 
 def _read_all(package: ClassScope) -> None:
@@ -274,14 +287,42 @@ def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None
 
 
 def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassScope | None:
+    """The package of a name, of the version at least that a package which was read `uses`."""
+    users = {said: one.name for one in root.classes.values() if (said := version_of(one.definition, name))}
+    asked = max(users, key=_numbers, default="")
+    older: list[str] = []
     for folder in folders:
         versions = [p for p in folder.glob(f"{name} *") if (p / "package.mo").is_file()]
-        versions.sort(key=lambda p: [int(n) for n in re.findall(r"\d+", p.name)], reverse=True)
-        for place in [folder / name] if (folder / name / "package.mo").is_file() else versions:
-            return package_in(place, root)
-        if (found := _in_folder(folder, name, root)) is not None:
-            return found
+        versions.sort(key=lambda p: _numbers(p.name.rpartition(" ")[2]), reverse=True)
+        for place in [folder / name] if (folder / name / "package.mo").is_file() else versions[:1]:
+            found = package_in(place, root)
+            here = version_of(found.definition)
+            if not here or _numbers(here) >= _numbers(asked):
+                return found
+            older.append(f"version {here} in {place}")
+        if not older and (one := _in_folder(folder, name, root)) is not None:
+            return one
+    if older:
+        words = f"found {name} of {', '.join(older)}, expected {asked} or later, which {users[asked]} uses; give a folder"
+        raise ModelError(f"{words} that holds it, libraries=[...], --library")
     return None
+
+
+def version_of(definition: tree.ClassDefinition, used: str = "") -> str:
+    """The version that a package says it has, or that it says it uses of another; "" where it says none."""
+    arguments: Iterable[Any] = definition.annotation or ()
+    value = None
+    for name in (*(("uses", used) if used else ()), "version"):
+        said = [one for one in arguments if isinstance(one, tree.Argument) and one.name == name]
+        if not said or (one := said[0].modification) is None:
+            return ""
+        arguments, value = one.arguments or (), one.value
+    return value.text.strip('"') if isinstance(value, tree.StringLiteral) else ""
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """A version as numbers, of which one without zeros at its end is the same."""
+    return tuple(map(int, re.findall(r"\d+", re.sub(r"(\.0)*([-+ ].*)?$", "", version))))
 
 
 def _renamed(package: ClassScope, name: str) -> ClassScope | None:
