@@ -228,6 +228,8 @@ def _intact(folder: Path, key: str) -> Path | None:
     """What was compiled for a key; what is damaged is deleted."""
     for path in folder.glob(f"{key}-*"):
         if _digest(path) == path.stem.partition("-")[2]:
+            with suppress(OSError):  # a cache that cannot be written
+                os.utime(path)
             return path
         path.unlink(missing_ok=True)
     return None
@@ -247,8 +249,6 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
             (folder / f"{key}.failed").mkdir()
         path.unlink(missing_ok=True)
         return None
-    with suppress(OSError):  # a cache that cannot be written
-        os.utime(path)
     return found
 
 

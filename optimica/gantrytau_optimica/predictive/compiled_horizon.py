@@ -1,6 +1,7 @@
 """A horizon as machine code of this computer: the controller's C, whose linearisation and program are called one by one."""
 
 import ctypes
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +93,12 @@ class CompiledHorizon:
 
 
 def compiled_horizon(code: SampledCode, stages: HorizonStages, elements: int) -> CompiledHorizon | None:
-    """The horizon of a controller's C; None where it cannot be compiled."""
+    """The horizon of a controller's C; None where it cannot be compiled or loaded."""
     begin, end = '#include "controller.h"', "#include <math.h>\n#include <string.h>"
     plain = code_size(stages.point) > SMALL  # long straight code takes a compiler minutes to optimise
     text = code.source.replace(begin, code.header + PLAIN * plain).replace(end, OPTIMISED * plain + end, 1)
     path = library(text + EXPORTS)
-    return None if path is None else CompiledHorizon(path, stages, elements)
+    if path is not None:
+        with suppress(OSError):  # of another computer
+            return CompiledHorizon(path, stages, elements)
+    return None

@@ -60,7 +60,8 @@ class Mpc:
     `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
     disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
     2003).
-    guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
+    guess: of the first plan: an Optimum or Result of the same names, or name -> number or function of time; by
+    default it is at rest. Full steps lead on from there, or Ipopt does.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """

@@ -4,6 +4,7 @@ import ctypes
 import re
 import shutil
 import subprocess
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,7 +144,7 @@ def test_estimates_are_given_behind_the_state_in_c(tmp_path):
 
 def test_an_mpc_in_machine_code_gives_what_it_gave_before(tmp_path, monkeypatch):
     monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))  # 3 s to compile
-    keywords = dict(
+    keywords: Any = dict(
         rates={"pole.f": (-200.0, 100.0)}, blocks=[1, 1, 2, 4], disturbance=["pole.f"], terminal="lqr"
     )
     mpc = Mpc(Upright, period=0.05, elements=15, **keywords)
