@@ -150,9 +150,9 @@ def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Functi
     return kernel_for(function, calls, wait).function
 
 
-def library(source: str, level: str = "-O3") -> Path | None:
+def library(source: str) -> Path | None:
     """A shared library of C, which is compiled now unless it is in the cache; None where it cannot be."""
-    command, folder = _command(level), kernel_folder()
+    command, folder = _command("-O3"), kernel_folder()
     if command is None or folder is None:
         return None
     key = _key(source, command)
@@ -228,6 +228,8 @@ def _intact(folder: Path, key: str) -> Path | None:
     """What was compiled for a key; what is damaged is deleted."""
     for path in folder.glob(f"{key}-*"):
         if _digest(path) == path.stem.partition("-")[2]:
+            with suppress(OSError):  # a cache that cannot be written
+                os.utime(path)
             return path
         path.unlink(missing_ok=True)
     return None
@@ -247,8 +249,6 @@ def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
             (folder / f"{key}.failed").mkdir()
         path.unlink(missing_ok=True)
         return None
-    with suppress(OSError):  # a cache that cannot be written
-        os.utime(path)
     return found
 
 

@@ -12,9 +12,8 @@ import pytest
 from tests.families import NIGHTLY
 
 TESTS = Path(__file__).parent
-os.environ["GANTRYTAU_CACHE"] = (
-    "off"  # no compilers beside the tests; those of kernels have folders of their own
-)
+# no compilers beside the tests; those of kernels have folders of their own
+os.environ["GANTRYTAU_CACHE"] = "off"
 LONGEST = (  # ten seconds of one processor and more; test_compiling.py takes minutes where zig's cache is empty
     "fmu/building/test_compiling.py",
     "notebooks/test_notebooks.py",

@@ -44,9 +44,8 @@ SWAPS: dict[type[ast.AST], str] = {
 MESSAGES = ("raise", 'f"', "Literal", "Error(")  # lines with one of these only word what is said
 Fault = tuple[int, str, str, str]
 PYTEST = ["-m", "pytest", "-x", "-q", "-n0", "--only=short", "-p", "no:cacheprovider", "-p", "no:randomly"]
-PATIENCE = (
-    30.0  # s that a run with a fault may take longer than twice one without; then it hangs, and is noticed
-)
+# s that a run with a fault may take longer than twice one without; then it hangs, and is noticed
+PATIENCE = 30.0
 
 
 def mutated(node: ast.AST) -> Iterator[str]:

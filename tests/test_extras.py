@@ -29,12 +29,8 @@ PACKAGES = [
 ]
 OWN = {"gantrytau", "gantrytau_models", "gantrytau_optimica", "gantrytau_fmu"}
 FOR_USERS = ("results", "view", "cross", "vision", "cluster")
-MODULES = {  # of distributions of `bench`, which are not installed everywhere, or install only a path
-    "do-mpc": {"do_mpc"},
-    "pin": {"pinocchio"},
-    "pythonfmu": {"pythonfmu"},
-    "rockit-meco": {"rockit"},
-}
+# of distributions of `bench`, which are not installed everywhere, or install only a path
+MODULES = {"do-mpc": {"do_mpc"}, "pin": {"pinocchio"}, "pythonfmu": {"pythonfmu"}, "rockit-meco": {"rockit"}}
 PROGRAMS = {  # used by name, not imported
     "basedpyright": "Makefile",
     "ruff": "Makefile",

@@ -43,12 +43,8 @@ READMES = {  # the page with the map of a folder
     "gantrytau_fmu": ROOT / "fmu" / "README.md",
 }
 FILES_IN_A_FOLDER, FILES_IN_THE_ROOT, LINES, LINES_OF_A_FUNCTION, ARGUMENTS = 14, 8, 400, 60, 8
-COMPONENTS = (
-    "gantrytau.mechanics.",
-    "gantrytau.blocks.",
-    "gantrytau.electrical.",
-    "gantrytau_models.",
-)  # their classes have the field's words, twice if need be
+# their classes have the field's words, twice if need be
+COMPONENTS = ("gantrytau.mechanics.", "gantrytau.blocks.", "gantrytau.electrical.", "gantrytau_models.")
 INSIDES = {"reduced", "indexed", "table", "choice", "blocks", "request", "settings"}  # of a translated model
 KEYHOLE = tuple(f"gantrytau.{room}" for room in ("compiler.", "simulation.", "writing.", "answers.", "dae"))
 KEYHOLE = (*KEYHOLE, "gantrytau_fmu.code.")  # who may look

@@ -12,9 +12,8 @@ from functools import cache
 from gantrytau.border.refusal import ModelError
 
 BASE = ("m", "kg", "s", "A", "K", "mol", "cd")
-Dimension = tuple[
-    int | Fraction, ...
-]  # whole exponents are int, which are many times as quick to add and compare
+# whole exponents are int, which are many times as quick to add and compare
+Dimension = tuple[int | Fraction, ...]
 
 ONE: Dimension = (0,) * len(BASE)
 

@@ -31,10 +31,9 @@ LAST = StateSelect.ALWAYS + 1  # the weight of what the caller asks for
 
 @dataclass(frozen=True)
 class StateChoice:
-    """states: names, in order; dummies: derivatives that became plain unknowns; condition: of the choice."""
+    """states: names, in order; condition: of the choice."""
 
     states: tuple[str, ...]
-    dummies: tuple[str, ...]
     condition: float
 
 
@@ -75,7 +74,7 @@ def choose_states(
             f"{', '.join(states)} ({len(states)} in all). Name other variables in "
         )
         raise StructureError(words, Given("states"), ", or fewer", place=title, argument="states")
-    return StateChoice(states, tuple(sorted(dummies)), condition)
+    return StateChoice(states, condition)
 
 
 def _basis(reduced, matrix, preference, wanted, rows, columns, title) -> tuple[list[str], float]:

@@ -157,9 +157,8 @@ class ArmFunctions(ModelFunctions):
         moved[self._turns] = np.angle(np.exp(1j * moved[self._turns]))
         way = start[:, lost] + np.linspace(0, 1, BETWEEN)[:, None, None] * moved
         minor = self._minors(way.swapaxes(1, 2).reshape(-1, len(q))).reshape(BETWEEN, -1)
-        within = (
-            np.abs(minor[1:-1]) > np.abs(np.diff(minor, 2, axis=0)) / 8
-        )  # as far as a parabola bends between places
+        # as far as a parabola bends between places
+        within = np.abs(minor[1:-1]) > np.abs(np.diff(minor, 2, axis=0)) / 8
         alike = (minor * minor[:1] > 0).all(axis=0) & within.all(axis=0)
         q[:, lost[alike]] = way[-1][:, alike]
         return q

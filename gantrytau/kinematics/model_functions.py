@@ -22,11 +22,8 @@ from gantrytau.kinematics.rotations import of_quaternion, of_quaternions, quater
 MOST = 30  # iterations from `near`
 CLOSE = 1e-11  # of a joint, in m or rad, relative to its size: what the iteration of the inverse leaves
 MOVES = 1e-6  # of the largest of its kind, by which joints move a coordinate that can be chosen
-SPIN = [
-    [2, 1],
-    [0, 2],
-    [1, 0],
-]  # rows and columns of the elements of a skew matrix that are those of its vector
+# rows and columns of the elements of a skew matrix that are those of its vector
+SPIN = [[2, 1], [0, 2], [1, 0]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -168,9 +168,8 @@ class Model(Declared):
     """
 
     drawn = True  # whether pictures show it and what is in it
-    annotated_experiment: ClassVar[
-        Mapping[str, float]
-    ] = {}  # what its author says of a simulation: `StopTime`, s
+    # what its author says of a simulation: `StopTime`, s
+    annotated_experiment: ClassVar[Mapping[str, float]] = {}
 
     def equations(self) -> Iterator[Any]:
         """Equations (`a == b`) and connections (`connect(a, b)`), one per yield."""

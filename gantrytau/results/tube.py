@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 RELATIVE = 0.002  # of a signal's range, and of the time of the run
-PULSE = (
-    1e-6  # of the time of the run: what lasts shorter is the width that an integrator gives to one instant
-)
+# of the time of the run: what lasts shorter is the width that an integrator gives to one instant
+PULSE = 1e-6
 ABSOLUTE = 1e-6  # of the largest value, or of the nominal value if that is larger: noise of both integrators
 
 

@@ -33,10 +33,8 @@ GROWTH = 10  # of a stretch in which nothing has switched
 OFTEN = 1e-2  # of a step's tolerance, where an integrator starts anew at hundreds of instants, in steps of first order
 SOMETIMES = 0.1  # the same, where it starts anew at events
 SMOOTHLY = 0.02  # the same, else: the errors of all steps then add up to a few times the tolerance of a run
-USUAL, ORDER = (
-    1e-9,
-    5,
-)  # below this tolerance of a step their number grows as tolerance**(-1 / (ORDER + 1)), and errors with it
+# below this tolerance of a step their number grows as tolerance**(-1 / (ORDER + 1)), and errors with it
+USUAL, ORDER = (1e-9, 5)
 LEAST = 1e-13  # of a step: rounding
 STARTING = 60  # steps of the integrator after it starts anew
 

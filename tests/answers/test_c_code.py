@@ -63,9 +63,8 @@ def load(source, folder, *names):
     """The functions of a C source, compiled as strict C99 without warnings of missing or wrong things."""
     path, library = folder / "code.c", folder / "code.so"
     path.write_text(source)
-    flags = (
-        "-std=c99 -pedantic -Werror=implicit-function-declaration -O0 -shared -fPIC"  # -O0 rounds as -O1 does
-    )
+    # -O0 rounds as -O1 does
+    flags = "-std=c99 -pedantic -Werror=implicit-function-declaration -O0 -shared -fPIC"
     subprocess.run([str(COMPILER), *flags.split(), "-o", library, path, "-lm"], check=True, timeout=120)
     return [ca.external(name, str(library)) for name in names]
 

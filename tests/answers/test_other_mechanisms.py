@@ -167,9 +167,8 @@ def test_passive_joints_are_found_by_iteration():
     for phi in (0.5, 0.8, 1.2):
         p = -np.arcsin(0.2 * np.sin(phi) / 0.5)
         x = 0.2 * np.cos(phi) + 0.5 * np.cos(p)
-        slope = 1 / (
-            -0.2 * np.sin(phi) + 0.2 * np.cos(phi) * np.tan(p)
-        )  # dphi/dx; L cos p dp = -r cos phi dphi
+        # dphi/dx; L cos p dp = -r cos phi dphi
+        slope = 1 / (-0.2 * np.sin(phi) + 0.2 * np.cos(phi) * np.tan(p))
         at = [x], [phi]
         assert numbers(mechanism.constraints, *at) == pytest.approx(0.0, abs=1e-12)
         assert numbers(mechanism.velocity_jacobian, *at) == pytest.approx(slope, rel=1e-10)

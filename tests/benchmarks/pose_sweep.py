@@ -15,9 +15,8 @@ from gantrytau_models import prototypes
 from gantrytau_optimica import Prepared, final, initial, prepare
 
 LOW, HIGH = (0.0, 2.4, -1.1), (1.8, 3.5, 0.0)  # m, the workspace that the thesis draws in its Figure 2.4
-LEAST_REACH = (
-    0.5  # m by which the tool is ahead of each cart, away from the singular position where it is beside
-)
+# m by which the tool is ahead of each cart, away from the singular position where it is beside
+LEAST_REACH = 0.5
 LEAST_DISTANCE = 0.2  # m
 
 

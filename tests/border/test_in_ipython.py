@@ -40,9 +40,8 @@ def test_tracebacks_have_the_frames_of_the_user_alone_with_the_cause(shell, caps
     ):
         assert line in shown
     assert "gantrytau/" not in shown
-    assert "flattening" in "".join(
-        traceback.format_exception(sys.last_value)
-    )  # the error itself keeps all frames
+    # the error itself keeps all frames
+    assert "flattening" in "".join(traceback.format_exception(sys.last_value))
 
 
 LIBRARY = """

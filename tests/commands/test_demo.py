@@ -32,9 +32,8 @@ def test_the_demo_solves_its_motions_and_writes_its_files(tmp_path):
     assert times == pytest.approx(TIMES, rel=1e-3)  # the accuracy to which they are refined
     branch, six_link = answer["more"]
     assert branch["time"] == pytest.approx(0.8602, rel=1e-3)
-    assert six_link["time"] == pytest.approx(
-        0.4160, rel=3e-3
-    )  # by Lagrange's equations and rod tensions, 20 elements
+    # by Lagrange's equations and rod tensions, 20 elements
+    assert six_link["time"] == pytest.approx(0.4160, rel=3e-3)
     for row in [*answer["rows"], branch, six_link]:
         assert row["refined"], row["row"]
         assert row["violation"] < 1e-3, row["row"]  # between the nodes as well: nothing rings

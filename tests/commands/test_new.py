@@ -55,9 +55,8 @@ def test_its_notebook_runs(project):
     assert found.returncode == 0, found.stderr
     duration = re.search(r"final_time = ([\d.]+) s", found.stdout)
     assert duration is not None
-    assert float(duration[1]) == pytest.approx(
-        0.28547, rel=1e-3
-    )  # s, as on ever finer meshes, to what is asked for
+    # s, as on ever finer meshes, to what is asked for
+    assert float(duration[1]) == pytest.approx(0.28547, rel=1e-3)
     jupytext = pytest.importorskip("jupytext")
     cells = jupytext.read(project / "notebook.py").cells
     assert {cell.cell_type for cell in cells} == {"markdown", "code"}

@@ -167,9 +167,8 @@ def test_signals_take_the_seed_of_the_run(answer, fails, robots):
     arguments = ("simulate", f"{robots}:Cart(m=1)", "--stop", "1", "--input", "f=prbs(7, hold=0.1)")
     first, again, other = (answer(*arguments, "--seed", seed)["final"] for seed in ("1", "1", "2"))
     assert first == again != other
-    assert first["v"] == pytest.approx(
-        round(first["v"] * 10) / 10, abs=1e-7
-    )  # ten pushes of 0.1 N.s, forth or back
+    # ten pushes of 0.1 N.s, forth or back
+    assert first["v"] == pytest.approx(round(first["v"] * 10) / 10, abs=1e-7)
     assert "--seed" in fails(MISUSE, *arguments)
 
 

@@ -68,9 +68,8 @@ def test_blocks_are_mutually_reachable_and_in_order(n, seed):
 def test_decomposition_counts_what_a_random_matrix_leaves_free(n, m, seed, density):
     random = np.random.default_rng(seed)
     pattern = random.random((n, m)) < density
-    rank = np.linalg.matrix_rank(
-        pattern * random.uniform(1, 2, (n, m))
-    )  # generic numbers: the structural rank
+    # generic numbers: the structural rank
+    rank = np.linalg.matrix_rank(pattern * random.uniform(1, 2, (n, m)))
     found = decompose([np.flatnonzero(row).tolist() for row in pattern], m)
     assert (len(found.surplus), len(found.free)) == (n - rank, m - rank)
     for column in range(m):  # a column is undetermined if the others alone have the same rank

@@ -129,7 +129,7 @@ def test_the_start_walks_as_far_as_it_has_to():
     assert x == pytest.approx(1e6, rel=1e-12)
 
 
-@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e10])
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1.0, 1e10])
 def test_a_linkage_of_any_size_closes_with_the_same_constraints(size):
     dae = translate(FourBar(*(size * np.array([1.0, 0.3, 0.9, 0.6]))))
     assert len(dae.redundant) == 3
@@ -144,9 +144,8 @@ def test_a_pendulum_of_any_size_swings_alike_on_a_rod_that_does_not_yield(size):
     at = dict(x=Start(0.8 * size), y=Start(-0.6 * size), v_x=Start(0.0), v_y=Start(0.0))
     swing = simulate(Pendulum(L=size, **at), stop=2 * math.sqrt(size), points=30)
     assert np.abs(np.hypot(swing["x"], swing["y"]) / size - 1).max() < 1e-11
-    assert swing.final("x") / size == pytest.approx(
-        0.76539, abs=5e-3
-    )  # in metres; small ones at the default tolerance
+    # in metres; small ones at the default tolerance
+    assert swing.final("x") / size == pytest.approx(0.76539, abs=5e-3)
 
 
 @pytest.mark.parametrize("size", [1e-8, 1e-6, 1.0])

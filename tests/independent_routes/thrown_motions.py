@@ -292,9 +292,8 @@ def _path(rng: np.random.Generator) -> ThrownMotion:
     corner, kind = 0.6, str(rng.choice(["if_else", "table", "fmax"]))
     before, behind = float(rng.choice([-0.3, 0.0, 0.5])), float(rng.choice([0.0, 0.4, 1.2]))
     before = 0.0 if kind == "fmax" else before
-    behind = (
-        behind if m + follower * before * behind > 0 else 0.0
-    )  # else it would be thrown back into the corner
+    # else it would be thrown back into the corner
+    behind = behind if m + follower * before * behind > 0 else 0.0
     of_v = bool(rng.random() < 0.5)  # which of both speeds is fixed, where either can be
 
     def equations(self: Any) -> Any:

@@ -38,9 +38,8 @@ def test_behind_its_end_a_sweep_goes_on_with_the_last_frequency(kind):
     t = ca.SX.sym("t")
     rate = ca.Function("rate", [t], [ca.jacobian(signal(t), t)])
     small = 1e-9
-    assert (
-        abs(float(rate(2.0 - small)) - float(rate(2.0 + small))) < 1e4 * small
-    )  # amplitude (2 pi 9)^2 and more of it
+    # amplitude (2 pi 9)^2 and more of it
+    assert abs(float(rate(2.0 - small)) - float(rate(2.0 + small))) < 1e4 * small
     np.testing.assert_allclose(
         signal.values([2.0 + 0.03, 2.5 + 0.03]), signal.values([3.0 + 0.03, 4.5 + 0.03]), atol=1e-12
     )
@@ -87,9 +86,8 @@ def test_samples_of_smooth_signals_are_near_them(signal):
     samples = signal.samples(0.5, 2.0)
     assert (samples.times[0], samples.times[-1], samples.kind) == (0.5, 2.0, "linear")
     t = np.linspace(0.5, 2.0, 40_001)
-    assert (
-        np.abs(samples.at(t, 0) - signal.values(t)).max() < 0.7e-4
-    )  # straight lines: (2 pi / 256)^2 / 8 of the amplitude
+    # straight lines: (2 pi / 256)^2 / 8 of the amplitude
+    assert np.abs(samples.at(t, 0) - signal.values(t)).max() < 0.7e-4
 
 
 @pytest.mark.parametrize(

@@ -102,9 +102,8 @@ def test_the_facts_of_table_5_5(f1):
     A, B = found.A, found.B
     # joints on turntables are 197.2 and 196.0 mm apart, as against 198.0 and 197.9 mm on the plate
     apart = [np.linalg.norm(x[j] - x[i]) for x in (A, B) for i, j in ((1, 2), (3, 4))]
-    np.testing.assert_allclose(
-        apart, [0.1972, 0.1960, 0.1980, 0.1979], atol=5e-5
-    )  # the digits that are printed
+    # the digits that are printed
+    np.testing.assert_allclose(apart, [0.1972, 0.1960, 0.1980, 0.1979], atol=5e-5)
     # axes of q4 and q5 are antiparallel within 1.1 deg, which printed signs are not
     axes = found.H[1, :3, 1], found.chain[2][1][:3, 1]
     assert math.degrees(math.acos(-axes[0] @ axes[1])) < 1.15

@@ -63,9 +63,8 @@ def test_carts_of_three_links_beside_their_ellipsoids():
 
 def test_a_platform_also_turns(tmp_path):
     stewart = Kinematics(StewartPlatform(), tool="platform")
-    r = stewart.home.r + np.array(
-        [[0.05, 0.0, 0.0], [0.0, 0.05, 0.02], [np.nan, 0.0, 0.0]]
-    )  # the last is nowhere
+    # the last is nowhere
+    r = stewart.home.r + np.array([[0.05, 0.0, 0.0], [0.0, 0.05, 0.02], [np.nan, 0.0, 0.0]])
     found = accuracy(stewart, r, errors=np.full(6, 1e-5))
     assert np.isnan(found.error).tolist() == [False, False, True]
     assert (found.turn[:2] > 0).all()

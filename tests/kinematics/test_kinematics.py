@@ -59,9 +59,8 @@ def test_three_links_agree_with_the_equations_of_the_model(three):
     r, R = three.fk(q)
     function = three.dae.function(["tool.r"], list(three.joints))
     for row in range(5):
-        np.testing.assert_allclose(
-            np.ravel(function(r[row])), q[row], atol=1e-9
-        )  # of the iteration in the model
+        # of the iteration in the model
+        np.testing.assert_allclose(np.ravel(function(r[row])), q[row], atol=1e-9)
     np.testing.assert_array_equal(R, np.broadcast_to(AXES, (5, 3, 3)))
 
 

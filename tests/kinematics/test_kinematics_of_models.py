@@ -54,9 +54,8 @@ def test_poses_that_are_no_numbers_are_nan_without_a_word(delta, capfd):
 
 def test_an_interrupt_ends_the_call_between_two_blocks(delta):
     """Poses out of reach take longest; Ctrl-C while CasADi iterates is no failure of the iteration, and ends arrays too."""
-    delta.ik(
-        delta.home.r
-    )  # its functions are made; while CasADi makes some, it may drop a Ctrl-C: heeding_interrupts
+    # its functions are made; while CasADi makes some, it may drop a Ctrl-C: heeding_interrupts
+    delta.ik(delta.home.r)
     main = threading.main_thread().ident
     assert main is not None
     timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))

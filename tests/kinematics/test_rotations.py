@@ -33,9 +33,8 @@ def test_a_vector_that_is_told_has_one_sign_near_half_a_turn():
     ):
         told = told_vector(of_vector(np.array(w)))
         assert of_vector(told) == pytest.approx(of_vector(np.array(w)), abs=1e-9)
-        assert (
-            np.linalg.norm(told) < np.pi - 0.05 or told[np.argmax(np.abs(told))] > 0
-        )  # either side of half a turn
+        # either side of half a turn
+        assert np.linalg.norm(told) < np.pi - 0.05 or told[np.argmax(np.abs(told))] > 0
 
 
 def test_one_direction_is_turned_into_another():

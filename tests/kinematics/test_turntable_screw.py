@@ -45,9 +45,8 @@ def test_pivots_are_as_far_apart_as_the_screw_is_long(screw):
 @all_screws
 def test_forth_and_back(screw):
     phi = inside(screw)
-    np.testing.assert_allclose(
-        screw.turntable(screw.motor(phi)), phi, atol=1e-11
-    )  # by the slope at dead centres
+    # by the slope at dead centres
+    np.testing.assert_allclose(screw.turntable(screw.motor(phi)), phi, atol=1e-11)
     assert screw.motor(0.0) == 0.0
     assert abs(screw.turntable(0.0)) < 1e-15 * 4
     assert np.shape(screw.motor(0.1 * np.eye(3))) == (3, 3)

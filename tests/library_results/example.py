@@ -20,9 +20,8 @@ from tests.library_results.references import Example, Reference, references
 TOLERANCE = 1e-6  # of an experiment that says none
 PASSED, LEFT, REFUSED, NOT_RUN, NO_REFERENCE = "passed", "left", "refused", "not run", "no reference"
 RAN = "ran"  # to its end, without a reference to compare with
-BEGINNING = (
-    0.01  # of the run: where a motion is shorter than the interval of the output times, it is run again alone
-)
+# of the run: where a motion is shorter than the interval of the output times, it is run again alone
+BEGINNING = 0.01
 LONGEST = 300  # characters of a message
 
 

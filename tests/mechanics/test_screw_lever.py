@@ -54,9 +54,8 @@ def test_the_motor_does_the_work_of_both_inertias(swinging):
     energy = 0.5 * 2e-5 * swinging["spindle.w"] ** 2 + 0.5 * 0.8 * swinging["table.w"] ** 2
     power = swinging["motor.tau"] * swinging["spindle.w"]
     work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(swinging.time))])
-    np.testing.assert_allclose(
-        energy, work, atol=2e-4 * energy.max()
-    )  # the trapezoidal rule over 500 intervals
+    # the trapezoidal rule over 500 intervals
+    np.testing.assert_allclose(energy, work, atol=2e-4 * energy.max())
 
 
 def test_a_motor_that_leads_tells_the_angle_of_the_table():

@@ -386,3 +386,23 @@ def test_a_guess_that_initial_equations_determine_is_left_to_them(tmp_path):
     (tmp_path / "guessed.mo").write_text(GUESSED)
     result = simulate(load_modelica(tmp_path / "guessed.mo")["Guessed.Whole"](), stop=1.0)
     assert result.at(0.0, "lag.y") == pytest.approx(4)
+
+
+CHOICES = """package Choices
+  type E = enumeration(a, b, c);
+  model M
+    E last[2] = E.b:E.c;
+    Real x[3] = {if k == E.b then time else 0 for k in E.a:E.c}, y[E];
+  equation
+    for k in E.a:E.c loop
+      y[k] = if k <> E.c then Integer(k) else 10;
+    end for;
+  end M;
+end Choices;
+"""
+
+
+def test_a_range_of_an_enumeration_holds_its_values(tmp_path):
+    (tmp_path / "choices.mo").write_text(CHOICES)
+    result = simulate(load_modelica(tmp_path / "choices.mo")["Choices.M"](), stop=1.0)
+    assert [result.final(n) for n in ("last[1]", "x[1]", "x[2]", "y[2]", "y[3]")] == [2, 0, 1, 2, 10]

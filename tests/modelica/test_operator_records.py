@@ -164,3 +164,19 @@ def test_records_in_connectors_functions_algorithms_and_whens(tmp_path):
     assert found == pytest.approx(
         {"two.p.i.b": 2, "many[1].b": 1, "many[2].a": 4, "x[2]": 2, "sum.a": 6, "sum.b": 12, "held.a": 0.5}
     )
+
+
+@pytest.mark.parametrize(
+    ("equation", "said"),
+    [
+        (
+            "held = time",
+            "line 40, column 3: found a record of a, b and no record beside '=', expected two of one type",
+        ),
+        ("same = {Pair(1, 2)}", r"found sizes \[2\] and \[1\] beside '=', expected one size"),
+    ],
+)
+def test_records_equal_records_of_their_type_and_size_alone(tmp_path, equation, said):
+    (tmp_path / "arrays.mo").write_text(ARRAYS.replace("connect(two.n, ground.p);", f"{equation};"))
+    with pytest.raises(ModelError, match=said):
+        simulate(load_modelica(tmp_path / "arrays.mo")["M"](), stop=1.0)

@@ -22,9 +22,8 @@ from tests.references.rotations import skew, turn
 SPEEDS = 12
 UP = np.array([0.0, 0.0, 9.81])  # m/s2
 HOME_Q = np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.0])  # m, rad: a pose far from singular ones
-HOME = np.array(
-    [-0.2, 2.1, -0.2]
-)  # m, near the tool of F1 and F1_ideal there, links uncrossed, below the carts
+# m, near the tool of F1 and F1_ideal there, links uncrossed, below the carts
+HOME = np.array([-0.2, 2.1, -0.2])
 
 
 @dataclass(frozen=True, eq=False)

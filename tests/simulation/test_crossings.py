@@ -85,9 +85,8 @@ def test_where_no_step_leads_to_a_crossing_its_condition_is_named(monkeypatch):
             yield der(self.height) == -if_else(self.height > 0.5, 1.0, 2.0)
 
     monkeypatch.setattr("gantrytau.simulation.integration.located", lambda *_: None)
-    assert simulate(Falling(), stop=1.0).final("height") == pytest.approx(
-        -0.5, abs=1e-7
-    )  # by places laid closer
+    # by places laid closer
+    assert simulate(Falling(), stop=1.0).final("height") == pytest.approx(-0.5, abs=1e-7)
     monkeypatch.setattr("gantrytau.simulation.integration.Run._nearer", lambda _: False)
     with pytest.raises(SolveError, match=r"^Falling: .*no step leads to where the condition on height turns"):
         simulate(Falling(), stop=1.0)

@@ -368,9 +368,8 @@ def test_what_is_said_to_be_smooth_is_no_event(points):
             side = if_else(self.x > 0, 1.0, -1.0, smooth=True)
             yield der(self.x) == self.v
             yield der(self.v) == -if_else(between(-1, self.x, 1), self.x, side, smooth=True)
-            yield (
-                self.y + if_else(self.y > 0, 2 * self.y, self.y, smooth=True) == self.x
-            )  # in a loop of its own
+            # in a loop of its own
+            yield (self.y + if_else(self.y > 0, 2 * self.y, self.y, smooth=True) == self.x)
 
     found = simulate(Soft(), stop=20.0, tolerance=1e-10, points=points)
     x = found["x"]

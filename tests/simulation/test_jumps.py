@@ -229,9 +229,8 @@ def test_a_relay_loop_reaches_its_limit_cycle():
     x, v = found["x"][at], found["v"][at]
     np.testing.assert_allclose(x[1:], -x[:-1], atol=1e-8)
     np.testing.assert_allclose(v[1:], -v[:-1], atol=1e-8)
-    np.testing.assert_allclose(
-        np.diff(found.time[at]), 2 * np.abs(v[:-1]), atol=1e-8
-    )  # from v to -v by 1 m/s2
+    # from v to -v by 1 m/s2
+    np.testing.assert_allclose(np.diff(found.time[at]), 2 * np.abs(v[:-1]), atol=1e-8)
 
 
 def test_aliases_with_sign_and_offset():

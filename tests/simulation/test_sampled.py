@@ -264,9 +264,8 @@ def test_the_robot_under_discrete_control_moves_as_when_integrated_instant_by_in
         measured = np.array([float(x) for x in carts_of(y[:3], y[3:])])
         wanted = begin + 0.05 * (1 - np.cos(20 * 0.01 * k))
         push = 2e4 * (wanted - measured[:3]) - 600 * measured[3:]
-        assert np.allclose(
-            found["force"][2 * k], push, rtol=0, atol=1e-3
-        )  # N; 2e4 N/m times the error of 1e-8 m
+        # N; 2e4 N/m times the error of 1e-8 m
+        assert np.allclose(found["force"][2 * k], push, rtol=0, atol=1e-3)
         y = solve_ivp(move, (0, 0.01), y, args=(push,), method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
         assert np.abs(found[states[0]][2 * k + 2] - y[:3]).max() < NEAR
         assert np.abs(found[states[1]][2 * k + 2] - y[3:]).max() < 100 * NEAR  # 1/s, the closed loop's speed

@@ -279,9 +279,8 @@ def test_a_solution_that_ends_in_finite_time_stops_with_what_was_found():
     partial = error.result
     assert partial.time[-1] <= error.time < partial.time[-1] + 0.004  # the next output point
     inside = partial.time < 0.9
-    np.testing.assert_allclose(
-        partial["x"][inside], 1 / (1 - partial.time[inside]), rtol=1e-4
-    )  # errors grow with the solution
+    # errors grow with the solution
+    np.testing.assert_allclose(partial["x"][inside], 1 / (1 - partial.time[inside]), rtol=1e-4)
 
 
 def test_a_tool_led_out_of_reach_stops_and_names_the_link():

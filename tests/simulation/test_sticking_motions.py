@@ -120,9 +120,8 @@ def test_a_belt_whose_speed_is_an_input_carries_it_along():
     run = simulate(
         Driven(w=Fixed(0.0)), stop=0.2, tolerance=TOLERANCE, inputs={"drive": lambda t: 0.02 * sin(9 * t)}
     )
-    np.testing.assert_allclose(
-        run["s"], 0.02 / 9 * (1 - np.cos(9 * run.time)), atol=NEAR
-    )  # it sticks all the way
+    # it sticks all the way
+    np.testing.assert_allclose(run["s"], 0.02 / 9 * (1 - np.cos(9 * run.time)), atol=NEAR)
 
 
 class Incline(Model):

@@ -9,12 +9,8 @@ import pytest
 from tests.site.code_blocks import PageError, blocks, check_page, same
 
 SITE = Path(__file__).parents[2] / "notebooks" / "site"
-MADE = {
-    "reference",
-    "messages",
-    "gallery",
-    "library",
-}  # folders that are written when the site is built, which finds broken links itself
+# folders that are written when the site is built, which finds broken links itself
+MADE = {"reference", "messages", "gallery", "library"}
 PAGES = [page for page in sorted(SITE.rglob("*.md")) if blocks(page.read_text(encoding="utf-8"))]
 
 

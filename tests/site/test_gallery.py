@@ -59,9 +59,8 @@ def test_a_ball_is_a_disc_and_a_bar_as_long_as_it_is_seen():
     assert ball.mean() == pytest.approx(np.pi / 4, rel=0.02)  # of the square around it
     bar = drawn(Stick(a=(10.0, 0.0, 0.0), b=(10.0, 0.0, 5.0), radius=0.5))
     upwards = VIEW[2] / np.linalg.norm(VIEW)
-    ratio = (
-        5.0 * np.sqrt(1 - upwards**2) + upwards
-    )  # its length and the ends that are seen from above, over its width
+    # its length and the ends that are seen from above, over its width
+    ratio = 5.0 * np.sqrt(1 - upwards**2) + upwards
     assert np.divide(*bar.shape) == pytest.approx(ratio, rel=0.02)
 
 

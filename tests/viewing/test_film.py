@@ -43,9 +43,8 @@ def test_rods_end_in_their_frames(fall, film):
             for k, row in shown:
                 assert np.allclose(end[row], fall[f"{rod}.{name}"][k], rtol=0, atol=ROUND)
         length = fall["arms[0].links[0].length"][0] if "[0].rod" in rod else bar.size[0, 2]
-        assert np.allclose(
-            bar.size[[row for _, row in shown], 2], length, rtol=0, atol=1e-6
-        )  # tolerance of the constraints
+        # tolerance of the constraints
+        assert np.allclose(bar.size[[row for _, row in shown], 2], length, rtol=0, atol=1e-6)
 
 
 def test_the_plate_turns_with_its_frame(fall, film):

@@ -21,9 +21,8 @@ def test_loops_close_at_all_choices_that_can_be(bar):
     poses = posing.everywhere()
     angles, lengths = (slider.values for slider in posing.sliders)
     phi, crank = np.meshgrid(angles, lengths, indexing="ij")
-    gap = np.hypot(
-        ground - crank * np.cos(phi), crank * np.sin(phi)
-    ).ravel()  # what coupler and rocker bridge
+    # what coupler and rocker bridge
+    gap = np.hypot(ground - crank * np.cos(phi), crank * np.sin(phi)).ravel()
     apart = (gap > coupler + rocker + 1e-6) | (gap < abs(coupler - rocker) - 1e-6)
     assert np.all(poses.failed[apart])
     assert (~poses.failed).sum() > 0.9 * (~apart).sum() > 0

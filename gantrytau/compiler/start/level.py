@@ -91,9 +91,8 @@ class Level:
         """How large the terms of some residuals are, at numbers of the leaves."""
         key, whole = ("sizes", *rows), ("sizes", *range(len(self.residuals)))
         if key not in self._made and any(other[0] == "sizes" for other in self._made):
-            return self._sized(whole, numbers)[
-                list(rows)
-            ]  # of all at once, rather than of others again and again
+            # of all at once, rather than of others again and again
+            return self._sized(whole, numbers)[list(rows)]
         return self._sized(key, numbers)
 
     def _sized(self, key: tuple[Any, ...], numbers: np.ndarray) -> np.ndarray:

@@ -13,15 +13,8 @@ from gantrytau.results.figures import check_suffix, finished
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLOURS = (
-    "#9fd69f",
-    "#ffffff",
-    "#c9d5e8",
-    "#f2dfb0",
-    "#e8b3ab",
-    "#d9c8ea",
-    "#bfe3e0",
-)  # in the order of REASONS
+# in the order of REASONS
+_COLOURS = ("#9fd69f", "#ffffff", "#c9d5e8", "#f2dfb0", "#e8b3ab", "#d9c8ea", "#bfe3e0")
 _OBSTACLE = "0.35"
 _UNITS = {"stroke": "m", "turn": "rad", "angle": "rad", "clearance": "m"}
 _FINE = 300  # points along a side, of which outlines of obstacles are drawn

@@ -23,9 +23,8 @@ class Origin(TwoFrames):
         a, b = self.frame_a, self.frame_b
         x, y, z = (ca.DM.eye(3)[:, k] for k in range(3))
         turn = about(z, self.rpy[2]) @ about(y, self.rpy[1]) @ about(x, self.rpy[0])
-        turn = (
-            ca.floor(turn * 2**50 + 0.5) / 2**50
-        )  # half a turn has the sine 0, not 1e-16: planes stay planes
+        # half a turn has the sine 0, not 1e-16: planes stay planes
+        turn = ca.floor(turn * 2**50 + 0.5) / 2**50
         arm = a.R @ self.xyz
         yield branch(a, b, forward=dict(R=a.R @ turn, w=a.w), backward=dict(R=b.R @ turn.T, w=b.w))
         yield b.r == a.r + arm

@@ -273,12 +273,9 @@ def called_class(
     whole = definition.kind == "record"
     inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
-    mapped = next((n for n, one in given.items() if not record and is_longer(inputs[n], one)), None)
-    if mapped is not None:
-        longer = {n for n, one in given.items() if is_longer(inputs[n], one)}
-        count = range(len(given[mapped]))
-        all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
-        each = [called_class(scope, (), one, beyond, known) for one in all_given]
+    longer = [] if record else [n for n, one in given.items() if is_longer(inputs[n], one)]
+    if longer:
+        each = [called_class(scope, (), one, beyond, known) for one in _one_by_one(scope, given, longer)]
         return values.array(each)
     if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
@@ -304,6 +301,17 @@ def called_class(
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
     return found if len(found) != 1 else first_result(found)
+
+
+def _one_by_one(
+    scope: ClassScope, given: Mapping[str, Any], longer: Sequence[str]
+) -> Iterator[Mapping[str, Any]]:
+    """Arguments of each call of a function of scalars, of which some are given arrays."""
+    if len({len(given[n]) for n in longer}) > 1:
+        found = " and ".join(values.size_words(given[n]) for n in longer)
+        raise ModelError(f"found arrays of the sizes {found} for scalars of {scope.name}, expected one size")
+    for k in range(len(given[longer[0]])):
+        yield {n: one[k] if n in longer else one for n, one in given.items()}
 
 
 def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:

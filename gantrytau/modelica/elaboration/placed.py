@@ -104,7 +104,7 @@ class PlacedMembers:
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)
         if not hasattr(self.instance, name):
-            raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
+            raise ModelError(f"found {call.function.parts[0][0]}() in a value, expected it among equations")
         return getattr(self.instance, name)
 
     def cardinality(self) -> int:

@@ -153,8 +153,15 @@ def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         for one, other in zip(a, b, strict=True):
             yield from pairs(one, other)
         return
-    if hasattr(a, "member") or isinstance(a, values.RecordValue):
-        names: Iterable[str] = [*a] if isinstance(a, values.RecordValue) else cast(Members, a).names()
+    names, others = (_names(one) for one in (a, b))
+    if isinstance(a, list) or isinstance(b, list):
+        raise ModelError(
+            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
+        )
+    if (names is None) != (others is None) or not {*(names or ())} <= {*(others or ())}:
+        both = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
+        raise ModelError(f"found {both} beside '=', expected two of one type")
+    if names is not None:
         for name in names:
             yield from pairs(_member(a, name), _member(b, name))
         return
@@ -176,6 +183,13 @@ def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         )  # not taken for a scalar beside a vector
     else:
         yield left, right
+
+
+def _names(value: Any) -> list[str] | None:
+    """The members of a record; None for what is no record."""
+    if isinstance(value, values.RecordValue):
+        return [*value]
+    return [*cast(Members, value).names()] if hasattr(value, "member") else None
 
 
 def _member(value: Any, name: str) -> Any:

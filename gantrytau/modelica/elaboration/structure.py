@@ -76,7 +76,7 @@ class Structure:
         return f"{root.scope.definition.name}.{self.path}".rstrip(".")
 
     def next_sample(self, call: tree.Call) -> Any:
-        raise ModelError(f"found {call.function.parts[0][0]}() outside of equations and 'when'")
+        raise ModelError(f"found {call.function.parts[0][0]}() in a value, expected it among equations")
 
     def before(self, name: str, asked: str) -> Any:
         return None

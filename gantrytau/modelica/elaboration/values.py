@@ -127,7 +127,7 @@ def _shaped(value: Any) -> Any:
 
 def size_words(value: Any) -> str:
     """The size of a value as Modelica writes it."""
-    shape = np.shape(_shaped(value))
+    shape = all_sizes(value)
     return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
 
 

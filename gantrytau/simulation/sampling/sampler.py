@@ -121,9 +121,8 @@ class Sampler:
         """Places reached by one call, and whether it ended early because something switches."""
         t = trail.t[here : min(last, here + 2 * self.most) + 1]
         parts = np.ceil(np.diff(t) / step * (1 - 1e-12)).astype(int)
-        parts = np.maximum(
-            parts, np.diff(t) > 0
-        )  # where inputs jump, the step before goes on behind the jump
+        # where inputs jump, the step before goes on behind the jump
+        parts = np.maximum(parts, np.diff(t) > 0)
         parts[0] = max(parts[0], 1)
         ends = np.cumsum(parts)
         wanted = max(min(int(ends[-1]), self.most), int(parts[0]))

@@ -24,12 +24,8 @@ class ElasticLink(Link):
     c_joint = Parameter(115e6, unit="N/m", min=0.0, description="stiffness of each of its two ball joints")
     c_tube = Parameter(25e6, unit="N/m", min=0.0, description="stiffness of the tube, carbon, 2 m (assumed)")
     d = Parameter(0.0, unit="N.s/m", min=0.0, description="damping along the link")
-    rod = ElasticRod(
-        L=Link.length,
-        m=Link.mass,
-        c=1 / (2 / c_joint + 1 / c_tube),  # springs in series
-        d=d,
-    )
+    # springs in series
+    rod = ElasticRod(L=Link.length, m=Link.mass, c=1 / (2 / c_joint + 1 / c_tube), d=d)
 
 
 class SixGivingLinks(SixLinkGantryTau):

@@ -46,9 +46,8 @@ Method = Literal["gauss-newton", "ipopt"]
 Start = Literal["nominal", "linear"]
 Loss = Literal["linear", "robust"]
 Frame = Literal["fitted", "base"]
-ON_RODS = dict(
-    model=None, method="gauss-newton", start="nominal", orientation="local"
-)  # else robots on rods are meant
+# else robots on rods are meant
+ON_RODS = dict(model=None, method="gauss-newton", start="nominal", orientation="local")
 BY_NAMES = dict(joints=None, tool="tool")  # else robots by names of parameters are meant
 
 

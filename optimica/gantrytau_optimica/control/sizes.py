@@ -332,9 +332,8 @@ def _aims(problem: ControlProblem) -> np.ndarray:
         value, _ = _along(problem, phase, ca.vertcat(gradient, curvature), SHARES)
         found[first : first + len(phase.signals)] = _steps(*np.split(value, 2))
     points = _points(problem)
-    sums = {
-        one.symbol.element_hash(): one.symbol for one in problem.sums
-    }  # of a vector they share one symbol
+    # of a vector they share one symbol
+    sums = {one.symbol.element_hash(): one.symbol for one in problem.sums}
     arguments = [points.symbols, problem.numbers, *sums.values()]
     function = ca.Function(
         "steepness", arguments, list(map(ca.densify, _steepness(problem.objective, points.symbols)))

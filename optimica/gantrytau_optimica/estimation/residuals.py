@@ -24,10 +24,8 @@ from gantrytau_optimica.transcription.program import Program
 
 NEWTON_STEPS = 30
 CLOSE = 1e-9  # of typical sizes: the last step of Newton's method onto the manifold
-CLOSER, CHORD = (
-    1e-12,
-    0.1,
-)  # the last one with the Jacobian of another point, and what each of these must gain
+# the last one with the Jacobian of another point, and what each of these must gain
+CLOSER, CHORD = (1e-12, 0.1)
 
 
 @dataclass(frozen=True, eq=False)

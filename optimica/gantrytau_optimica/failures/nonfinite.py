@@ -63,9 +63,8 @@ def not_finite(built: Built, phases: Sequence[Trajectory]) -> list[NotFinite]:
         for e, words, table, origin in _expressions(built, phases)
         if (one := _fault(e, words, table))
     ]
-    used = {
-        one.cause for one, origin in faults if not origin
-    }  # of other definitions nothing in the program depends
+    # of other definitions nothing in the program depends
+    used = {one.cause for one, origin in faults if not origin}
     found: dict[str, NotFinite] = {}
     for one, origin in sorted(faults, key=lambda fault: KINDS.index(fault[0].kind)):
         if not origin or (one.cause and one.cause in used):

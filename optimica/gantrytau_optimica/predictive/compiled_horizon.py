@@ -1,6 +1,7 @@
 """A horizon as machine code of this computer: the controller's C, whose linearisation and program are called one by one."""
 
 import ctypes
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,19 @@ from gantrytau.kernels import SMALL, code_size, library
 from gantrytau_optimica.predictive.plan import PlannedMotion
 from gantrytau_optimica.predictive.stages import HorizonStages
 
+PLAIN = """
+#pragma GCC push_options
+#pragma GCC optimize ("O0")
+#ifdef __clang__
+#pragma clang optimize off
+#endif
+"""
+OPTIMISED = """
+#ifdef __clang__
+#pragma clang optimize on
+#endif
+#pragma GCC pop_options
+"""
 EXPORTS = """
 int horizon_size(void) { return (int)sizeof(controller_state); }
 
@@ -79,7 +93,12 @@ class CompiledHorizon:
 
 
 def compiled_horizon(code: SampledCode, stages: HorizonStages, elements: int) -> CompiledHorizon | None:
-    """The horizon of a controller's C; None where it cannot be compiled."""
-    text = code.source.replace('#include "controller.h"', code.header) + EXPORTS
-    path = library(text, "-O3" if code_size(stages.point) <= SMALL else "-O1")
-    return None if path is None else CompiledHorizon(path, stages, elements)
+    """The horizon of a controller's C; None where it cannot be compiled or loaded."""
+    begin, end = '#include "controller.h"', "#include <math.h>\n#include <string.h>"
+    plain = code_size(stages.point) > SMALL  # long straight code takes a compiler minutes to optimise
+    text = code.source.replace(begin, code.header + PLAIN * plain).replace(end, OPTIMISED * plain + end, 1)
+    path = library(text + EXPORTS)
+    if path is not None:
+        with suppress(OSError):  # of another computer
+            return CompiledHorizon(path, stages, elements)
+    return None

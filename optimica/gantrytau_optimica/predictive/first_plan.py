@@ -14,7 +14,7 @@ from gantrytau_optimica.predictive.plan import PlannedMotion
 from gantrytau_optimica.predictive.stages import MATRIX, NODES, WEIGHTS, HorizonStages
 from gantrytau_optimica.predictive.terminal import Terminal
 
-MOST = 500  # iterations of Ipopt
+MOST = 300  # iterations of Ipopt
 OPTIONS = {
     "print_time": False, "error_on_fail": False,
     "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MOST, "bound_relax_factor": 0.0, "mu_strategy": "adaptive"},
@@ -39,17 +39,8 @@ class FirstPlan:
             ca.MX.sym(*one) for one in (("x", nx, n + 1), ("w", stages.nw, n), ("u", nu, n), ("e", 1, n))
         )
         courses = len(stages.phase.courses)
-        given = [
-            ca.MX.sym(*one)
-            for one in (
-                ("x0", nx),
-                ("t", 2, n),
-                ("courses", 2 * courses, n),
-                ("before", nu),
-                ("P", nx, nx),
-                ("rest", nx),
-            )
-        ]
+        sizes = ((nx, 1), (2, n), (2 * courses, n), (nu, 1), (nx, nx), (nx, 1))
+        given = [ca.MX.sym(f"given_{k}", *size) for k, size in enumerate(sizes)]
         x0, t, known, before, P, rest = given
         point, parts = stages.merits.map(n), []
         for i in range(2):

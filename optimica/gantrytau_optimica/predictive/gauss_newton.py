@@ -15,6 +15,8 @@ from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
 
 STANDS = 1e-6  # changes of scaled inputs and states where iterations end; flat parts of a program are not solved better
+NEAR = 1e-2  # such changes, after which a first plan is good enough for a controller that goes on from it
+AWAY = 10.0  # times the least change: there iterations lead away again
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +30,11 @@ class Iterated:
     change: float
     slack: np.ndarray
     unbounded: bool = False
+
+    @property
+    def near(self) -> bool:
+        """Whether it is one that steps of later samples improve."""
+        return self.solved and self.change < NEAR
 
     @property
     def stands(self) -> bool:
@@ -138,6 +145,19 @@ class GaussNewton:
         # inputs at their limits stand before states do
         change = float(max(np.abs(found.u).max(), np.abs(found.x).max()))
         return Iterated(plan.changed(linear, found), True, change, found.slack)
+
+    def begun(self, plan: PlannedMotion, x: np.ndarray, most: int, ipopt: bool) -> Iterated:
+        """A first plan: that of the full step, of at most so many, that changes least, or Ipopt's where all change much."""
+        full = best = failed(plan)
+        for _ in range(most):
+            full = self._changed(full.plan, self.load(full.plan), x)
+            best = full if full.change < best.change else best
+            if not full.solved or best.stands or (best.near and full.change > AWAY * best.change):
+                break
+        if best.near or full.unbounded or not ipopt:
+            return best if best.near else full
+        found = self.globalised(plan, x)
+        return found if found.solved else full
 
     def globalised(self, plan: PlannedMotion, x: np.ndarray) -> Iterated:
         """The plan by Ipopt, from a guess from which full steps may lead further off."""

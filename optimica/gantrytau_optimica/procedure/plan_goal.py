@@ -27,9 +27,8 @@ class PlanGoal:
         for name in ("wanted", "tape"):
             value = number(NAME, name, getattr(self, name), above=0.0, most=LARGEST, unit="m")
             object.__setattr__(self, name, value)
-        number(
-            NAME, "margin", self.margin, above=0.0, below=LARGEST
-        )  # without one no way is shown to be clear
+        # without one no way is shown to be clear
+        number(NAME, "margin", self.margin, above=0.0, below=LARGEST)
         if self.spacing is not None:
             number(NAME, "spacing", self.spacing, above=0.0)
         for name, least in (("robots", 1), ("seed", 0), ("poses", FEWEST)):

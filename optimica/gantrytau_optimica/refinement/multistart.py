@@ -78,9 +78,8 @@ class Searching:
         """Solve from all other guesses."""
         clock, ended = self.reached.clock, dict[int, Optimum]()
         clock.enter(f"first guess 2 of {self.starts}")
-        self.attempts.solver(
-            0
-        )  # made now: what guesses take by themselves says whether processes are worth it
+        # made now: what guesses take by themselves says whether processes are worth it
+        self.attempts.solver(0)
         try:
             for k, found in each(self.attempts, self.guesses(), self.starts - 1):
                 ended[k] = self.attempts.optimum(found)

@@ -75,9 +75,8 @@ def sample_errors(layout: Layout) -> Iterator[tuple[SampleSum, ca.SX, np.ndarray
     for one in layout.phase.sums:
         start, final = float(layout.phase.start_time), float(layout.phase.final_time)
         element, place = layout.mesh.locate((one.times - start) / (final - start))
-        after = (place > 1 - 1e-9) & (
-            element < layout.mesh.elements - 1
-        )  # at a jump what holds from then on counts
+        # at a jump what holds from then on counts
+        after = (place > 1 - 1e-9) & (element < layout.mesh.elements - 1)
         element, place = np.where(after, element + 1, element), np.where(after, 0.0, place)
         value, deviation = ca.SX.sym("value"), ca.SX.sym("deviation")
         error = (one.expression - value) / deviation

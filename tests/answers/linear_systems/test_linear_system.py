@@ -156,9 +156,8 @@ def test_component_moves_as_its_matrices_say():
     w = rng.normal(size=(21, 2))
     motion = simulate(Driven(), stop=1.0, inputs={"w": (t, w)}, points=21, tolerance=1e-10)
     exact = StateSpace(*random_system(7)).simulate((t, w), x=[1.0, -1.0, 0.5, 0.0, 2.0])
-    assert motion["system.y"] == pytest.approx(
-        exact, abs=1e-8 * np.abs(exact).max()
-    )  # a hundred times the tolerance
+    # a hundred times the tolerance
+    assert motion["system.y"] == pytest.approx(exact, abs=1e-8 * np.abs(exact).max())
 
 
 def test_linearization_answers_as_a_linear_system_with_units(tmp_path):

@@ -17,10 +17,8 @@ from tests.benchmarks.gta import trapezoid
 from tests.benchmarks.peers.written import Columns, Motion
 
 START, END = (0.005910812, 0.225231848, -0.856752116), (0.224324724, -0.094084274, -0.773002065)  # m
-ANGLES = (
-    (0.662455729, 0.339366619, 0.970972357),
-    (0.027859289, 0.772906182, 0.505291612),
-)  # rad, of the arms there
+# rad, of the arms there
+ANGLES = ((0.662455729, 0.339366619, 0.970972357), (0.027859289, 0.772906182, 0.505291612))
 LIMIT = 12.0  # N.m
 AZIMUTHS = (0.0, 2 * np.pi / 3, 4 * np.pi / 3)
 BASE, ARM, ROD, PLATE = 0.2, 0.3, 0.8, 0.06  # m

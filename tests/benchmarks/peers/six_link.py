@@ -19,10 +19,8 @@ from tests.benchmarks.gta import trapezoid
 from tests.benchmarks.peers.written import Columns, Motion
 
 START, END = (-0.3810854, -4.234675413, -0.013504232), (0.317839115, -4.681717984, 0.153995869)  # m
-CARTS = (
-    (0.972182324, 0.904239254, 0.940267196),
-    (1.503179006, 1.749897504, 1.61476282),
-)  # m, where they are there
+# m, where they are there
+CARTS = ((0.972182324, 0.904239254, 0.940267196), (1.503179006, 1.749897504, 1.61476282))
 TURN = np.array(
     [
         [0.995487603, -0.040770981, 0.085684694],

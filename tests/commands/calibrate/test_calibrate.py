@@ -72,9 +72,8 @@ def test_parameters_are_near_the_truth_and_used_again(run, answer, measured, pos
     assert found["files"] == [str(folder / name) for name in FILES]
     assert found["success"] is True
     assert (found["poses_fitted"], found["poses_held_out"]) == (40, 40)
-    assert (
-        found["error_m"]["mean"] < 3 * NOISE
-    )  # of three noisy coordinates: 1.6 times, and what 40 poses leave
+    # of three noisy coordinates: 1.6 times, and what 40 poses leave
+    assert found["error_m"]["mean"] < 3 * NOISE
     assert found["findings"] == []
     for i, arm in enumerate(true_robot().arms):
         length = found["parameters"][f"arms[{i}].length"]
@@ -90,9 +89,8 @@ def test_parameters_are_near_the_truth_and_used_again(run, answer, measured, pos
     assert "Nothing doubtful" in spoken.stdout
     line = next(line for line in spoken.stdout.splitlines() if "arms[0].length" in line)
     value, deviation, change = map(float, line.split()[1:])
-    assert value == pytest.approx(
-        in_python.parameters["arms[0].length"], abs=1e-7
-    )  # as many digits are shown
+    # as many digits are shown
+    assert value == pytest.approx(in_python.parameters["arms[0].length"], abs=1e-7)
     assert deviation * 1e-6 == pytest.approx(in_python.deviations["arms[0].length"], rel=1e-2)
     assert change == pytest.approx(value - prototypes.L1.arms[0].length, abs=1e-6)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["measured-calibrated", "measured.csv"]
@@ -192,9 +190,8 @@ def test_rows_left_out_and_outliers_without_weight_are_told_by_their_lines(answe
     rows[30], rows[40, 2] = rows[3], np.nan
     file = measured(rows)
     text = file.read_text().splitlines()
-    file.write_text(
-        "\n".join([*text[:2], "", *text[2:]])
-    )  # an empty line holds no pose, but counts as a line
+    # an empty line holds no pose, but counts as a line
+    file.write_text("\n".join([*text[:2], "", *text[2:]]))
     found = answer("calibrate", file, *ROBOT, "--robust")
     told = {f["kind"]: (f["lines"], f["message"]) for f in found["findings"]}
     assert told["nan"][0] == [43]

@@ -13,9 +13,8 @@ from gantrytau_models import GantryTau, prototypes
 from tests.commands.calibrate.cells import measure, read_poses, true_robot, with_lines
 from tests.families import first_of
 
-procedure = import_module(
-    "gantrytau_optimica.procedure.plan_calibration"
-)  # of which the function has the name
+# of which the function has the name
+procedure = import_module("gantrytau_optimica.procedure.plan_calibration")
 
 FAULT, MISUSE, INTERRUPTED = 1, 2, 130
 FILES = [
@@ -206,9 +205,8 @@ def test_less_than_wanted_is_told(folder, run):
 def test_a_plan_that_is_not_good_says_so(run, folder, tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text(with_lines(error='error = "1 um"'))
-    found = run(
-        "calibrate", file, "--output", folder, "--json"
-    )  # on top of the stages that do not ask for it
+    # on top of the stages that do not ask for it
+    found = run("calibrate", file, "--output", folder, "--json")
     assert found.exit_code == FAULT
     record = json.loads(found.stdout)
     assert record["good"] is False

@@ -35,9 +35,8 @@ def test_the_fastest_motion_takes_two_seconds(run, answer, move):
     assert found["success"] is True
     assert found["status"] == "solved"
     assert found["objective"] == found["final_time"] == found["free"]["final_time"]
-    assert found["final_time"] == pytest.approx(
-        fastest(), abs=1e-5
-    )  # solved to 1e-8, limits relaxed by as much
+    # solved to 1e-8, limits relaxed by as much
+    assert found["final_time"] == pytest.approx(fastest(), abs=1e-5)
     assert found["iterations"] > 0
     assert found["seconds"].keys() == {"build", "solve"}
     assert found["versions"].keys() == {"gantrytau", "casadi", "python"}
@@ -158,7 +157,7 @@ def test_a_full_disk_does_not_cost_the_answer(fails, run, move, tmp_path, monkey
     assert json.loads(run(*arguments, "--json").stdout)["final_time"] == pytest.approx(fastest(), abs=1e-5)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+@pytest.mark.parametrize("suffix", first_of([".csv", ".nc"]))
 def test_a_saved_motion_is_where_the_next_search_starts(answer, move, tmp_path, suffix, monkeypatch):
     file = tmp_path / f"move{suffix}"
     answer("optimize", move, "--save", file)
@@ -274,9 +273,8 @@ def test_a_problem_of_optimica_text_is_named_by_its_file(run, answer):
     file = Path(__file__).parents[2] / "optimica" / "text" / "problems.mop"
     found = answer("optimize", f"{file}:Problems.Fastest", "--refine", "1e-6", "--set", "finalTime=3")
     assert found["problem"] == "Fastest"
-    assert found["free"]["finalTime"] == pytest.approx(
-        2.2811848, rel=1e-6
-    )  # of van der Pol's equation, converged
+    # of van der Pol's equation, converged
+    assert found["free"]["finalTime"] == pytest.approx(2.2811848, rel=1e-6)
     several = run("optimize", file)
     assert several.exit_code == MISUSE
     assert "several problems (Problems.Box, " in " ".join(several.stderr.split())

@@ -77,9 +77,8 @@ def test_symmetric_top_precesses_steadily():
     J, w = np.diag([0.5, 0.5, 0.8]), np.array([0.6, 0.0, 3.0])
     fall = simulate(thrown(w, J=J), stop=5.0, tolerance=1e-10, points=51)
     expected = free_body.symmetric_orientation(0.5, 0.8, np.eye(3), w, 5.0)
-    np.testing.assert_allclose(
-        fall["body.frame_a.R"][-1], expected, atol=1e-7
-    )  # a thousand times the tolerance
+    # a thousand times the tolerance
+    np.testing.assert_allclose(fall["body.frame_a.R"][-1], expected, atol=1e-7)
 
 
 def test_energy_and_angular_momentum_stay_for_a_hundred_seconds():

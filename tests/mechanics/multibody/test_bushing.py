@@ -57,9 +57,8 @@ def test_the_law_is_that_of_the_matrix_where_frames_are_aligned():
     expected = np.sort(np.sqrt(-np.real(modes)))
     found = np.sort(np.abs(np.imag(system.poles)))[::-1][:12:2][::-1]
     np.testing.assert_allclose(found, expected, rtol=1e-9)
-    assert (
-        np.abs(np.real(system.poles)).max() < 1e-5
-    )  # roots of a double zero, of the size of the root of rounding
+    # roots of a double zero, of the size of the root of rounding
+    assert np.abs(np.real(system.poles)).max() < 1e-5
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -205,9 +205,8 @@ def test_a_body_on_it_keeps_its_energy():
 
 def test_two_points_hold_from_the_angle_of_two_clearances_over_the_depth(contact):
     for direction in (0.0, 2.0, np.pi / 2, np.pi):
-        lean = np.array(
-            [-np.sin(direction), np.cos(direction), 0]
-        )  # turned about this, it leans along the other
+        # turned about this, it leans along the other
+        lean = np.array([-np.sin(direction), np.cos(direction), 0])
         along = np.array([np.cos(direction), np.sin(direction), 0])
         angle = np.arctan(2 * CLEARANCE / 0.02)
         for share, touches in ((1 - 1e-6, False), (1 + 1e-6, True)):
@@ -263,9 +262,8 @@ def test_below_the_mouth_the_tip_is_where_less_energy_holds_it(contact):
     assert inside["f"][2] < 0.02 * outside["f"][2]
     assert inside["inserted"] > 0
     assert outside["inserted"] == 0
-    assert strained(inside) == pytest.approx(
-        strained(outside), rel=0.05
-    )  # but for the edge, just above the tip
+    # but for the edge, just above the tip
+    assert strained(inside) == pytest.approx(strained(outside), rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -209,9 +209,8 @@ def test_gyroscope_precesses_at_the_rate_of_the_textbook():
     expected = np.column_stack(
         [np.sin(tilt) * np.cos(angle), np.sin(tilt) * np.sin(angle), np.cos(tilt) + 0 * angle]
     )
-    np.testing.assert_allclose(
-        axis, expected, atol=1e-5
-    )  # sixty turns; measured 1e-6, falls with the tolerance
+    # sixty turns; measured 1e-6, falls with the tolerance
+    np.testing.assert_allclose(axis, expected, atol=1e-5)
 
 
 # A body on a universal joint.

@@ -129,9 +129,8 @@ def test_a_trolley_led_by_a_function_of_time_swings_its_load():
     energy = 2.5 * v**2 + (0.12 + 1.62) * w**2 / 2 - 1.8 * np.cos(phi) * v * w - 1.8 * 9.81 * np.cos(phi)
     fine = simulate(Led(), stop=4.0, inputs={"source.s": way}, tolerance=1e-10, points=801)
     work = CubicSpline(fine.time, fine["source.f"] * fine["crane.rail.v"]).integrate(0.0, 4.0)
-    assert energy[-1] - energy[0] == pytest.approx(
-        float(work), abs=1e-6
-    )  # splines on 5 ms: (5e-3)^4 times 1e3
+    # splines on 5 ms: (5e-3)^4 times 1e3
+    assert energy[-1] - energy[0] == pytest.approx(float(work), abs=1e-6)
 
 
 class Screwed(Model):

@@ -115,11 +115,8 @@ def test_the_inertia_stands_in_the_axes_of_its_origin(tmp_path, rpy):
     )
     dae = translate(read(tmp_path, body)())
     torque = dae.function(["q.phi", "q.w", "der(q.w)"], ["q_drive.tau"])(0, 0, 1)
-    x, y, z = (
-        -np.sin(rpy[1]),
-        np.cos(rpy[1]) * np.sin(rpy[0]),
-        np.cos(rpy[1]) * np.cos(rpy[0]),
-    )  # z in its axes
+    # z in its axes
+    x, y, z = (-np.sin(rpy[1]), np.cos(rpy[1]) * np.sin(rpy[0]), np.cos(rpy[1]) * np.cos(rpy[0]))
     assert float(torque) == pytest.approx(0.1 * x**2 + 0.2 * y**2 + 0.25 * z**2, abs=1e-14)
 
 
@@ -299,9 +296,8 @@ def test_solids_stand_where_the_link_is(tmp_path):
     body += joint("q", "continuous", "base", "arm", '<axis xyz="0 0 1"/>')
     motion = simulate(read(tmp_path, body)(), stop=0.1, starts={"q.phi": HALF_TURN / 2})
     (cylinder,) = [solid for solid in solids(film_of(motion)) if solid.owner == "arm"]
-    assert cylinder.r[0] == pytest.approx(
-        np.array([0, 1, 0]), abs=1e-9
-    )  # 1 m along x of the link, turned by 90 degrees
+    # 1 m along x of the link, turned by 90 degrees
+    assert cylinder.r[0] == pytest.approx(np.array([0, 1, 0]), abs=1e-9)
     assert cylinder.R[0][:, 2] == pytest.approx(np.array([0, 1, 0]), abs=1e-9)
     assert cylinder.size[0] == pytest.approx(np.array([0.2, 0.2, 2.0]))
 

@@ -34,9 +34,8 @@ def test_inertia_of_the_rotors_is_mass_of_the_carts():
     positions, velocities, torques = random_motions(prototypes.GT_A, seed=1)
     found = mapped(driven, positions, velocities, *torques.T)
     expected = mapped(cart, positions, velocities, *(RATIO * torques).T)
-    assert (
-        relative(found, expected).max() < 1e-10
-    )  # guideways of GT_A are level, weight of carts does not count
+    # guideways of GT_A are level, weight of carts does not count
+    assert relative(found, expected).max() < 1e-10
 
 
 def test_measured_are_positions_and_speeds_of_the_carts():

@@ -57,18 +57,16 @@ def test_the_plate_has_the_modes_of_springs_along_its_links():
     bodies = modes(lifted(BushedSixLinkGantryTau), "")
     springs = modes(lifted(ElasticSixLinkGantryTau), "tool")
     assert bodies[:6] == pytest.approx(np.zeros(6), abs=0.5)  # each of six links may spin
-    assert bodies[6:12] == pytest.approx(
-        springs, rel=0.005
-    )  # 0.6 kg of links are nearer to the plate or farther
+    # 0.6 kg of links are nearer to the plate or farther
+    assert bodies[6:12] == pytest.approx(springs, rel=0.005)
     assert bodies[12] > 10 * springs[-1]  # links on their joints
 
 
 def test_a_plate_that_does_not_turn_has_the_modes_of_the_literature():
     """Two joints of 115 N/um and a tube of 25 N/um on each link, 1, 2 and 3 links, a mass point of 22.38 kg."""
     found = modes(lifted(BushedSixLinkGantryTau, J=1e6 * np.eye(3)), "")
-    assert found[9:12] == pytest.approx(
-        [59.0, 148.0, 305.0], rel=0.02
-    )  # the plate's turns are slow, links spin
+    # the plate's turns are slow, links spin
+    assert found[9:12] == pytest.approx([59.0, 148.0, 305.0], rel=0.02)
 
 
 def test_place_out_of_reach_is_refused_before_any_link_is_stretched():

@@ -83,9 +83,8 @@ def test_plate_of_F1_ideal_turns_with_its_turntables(robots, angles):
     values = dict(zip(POSITIONS, (0.4, -0.05, 0.1, alpha, -alpha, tilt), strict=True))
     found = robots["F1_ideal"].evaluate(values)
     expected = Rotation.from_rotvec([alpha, 0, 0]) * Rotation.from_rotvec([0, -tilt, 0])
-    np.testing.assert_allclose(
-        found["tool.R"], expected.as_matrix(), atol=1e-12, rtol=0
-    )  # rounding times the condition
+    # rounding times the condition
+    np.testing.assert_allclose(found["tool.R"], expected.as_matrix(), atol=1e-12, rtol=0)
 
 
 def test_forward_and_inverse_kinematics(robots, name):
@@ -137,9 +136,8 @@ def test_inverse_dynamics_give_the_forces_back(robots, name):
         force = rng.uniform(-1.0, 1.0, 6) * [100, 100, 100, 10, 10, 10]
         u_dot = f1.accelerations(record, state, force).u_dot
         found = np.ravel(called(needed, *state.q, *state.u[6:], *u_dot[6:]))
-        np.testing.assert_allclose(
-            found, force, atol=1e-8, rtol=0
-        )  # N: rounding times accelerations and condition
+        # N: rounding times accelerations and condition
+        np.testing.assert_allclose(found, force, atol=1e-8, rtol=0)
 
 
 def test_without_friction_it_falls_as_one(robots):
@@ -166,9 +164,8 @@ def test_energy_grows_by_the_work_of_the_motors(robots, name):
     ]
     balance = [f1.energy(record, state) - force @ state.q for state in states[::25]]
     assert np.ptp(balance) < 1e-6  # J, of which there are hundreds: ten times the tolerance of the integrator
-    assert (
-        max(np.abs(f1.constraints(record, state)).max() for state in states) < 1e-10
-    )  # held at output points
+    # held at output points
+    assert max(np.abs(f1.constraints(record, state)).max() for state in states) < 1e-10
     assert np.ptp(motion["tool.R"], axis=0).max() > 0.05  # the plate has turned
 
 

@@ -89,9 +89,8 @@ def test_symmetric_poses(robot):
     np.testing.assert_allclose(on_axis.sum(axis=1), np.pi, atol=1e-12)
     one, other = robot.ik([[0.12, 0.45, 0.0], [-0.12, 0.45, 0.0]])
     np.testing.assert_allclose(one, np.pi - other[::-1], atol=1e-12)
-    right = np.array(
-        [[np.pi / 2, np.pi / 2], [np.pi, np.pi / 2], [np.pi / 2, 0.0]]
-    )  # across and along the ground
+    # across and along the ground
+    right = np.array([[np.pi / 2, np.pi / 2], [np.pi, np.pi / 2], [np.pi / 2, 0.0]])
     np.testing.assert_allclose(robot.fk(right)[0][:, :2], meeting(right), atol=1e-12)
 
 

@@ -95,9 +95,8 @@ def test_it_is_calibrated_by_poses_of_its_plate(moved):
     q, r, R = moved
     measured = Measurements(q, r + 20e-6 * np.random.default_rng(1).standard_normal(r.shape), R)
     fit = calibrate(FiveDofGantryTau(prototypes.L1), measured)
-    assert (
-        len(fit.names) == 57
-    )  # a direction for each of five carts, seven more numbers for each of six links
+    # a direction for each of five carts, seven more numbers for each of six links
+    assert len(fit.names) == 57
     assert fit.error < 40e-6  # noise of 20 um in each of three coordinates is 32 um
     with pytest.raises(ModelError, match=r"start='linear'.* expected 'nominal'"):
         calibrate(FiveDofGantryTau(prototypes.L1), measured, start="linear")

@@ -47,9 +47,8 @@ def test_held_carts_leave_the_sway_of_the_frame_and_the_modes_of_the_arms():
     frequencies = held(PLACE)
     assert frequencies == pytest.approx([7.4, 10.4, 12.2, 78.4], rel=0.01)
     # at no place do these springs have a second mode of the tool below 12.1 Hz: 1.8 kg more at the wrist
-    assert held([0.9, 3.2, -0.4], plate_mass=24.2)[:3] == pytest.approx(
-        [7.4, 10.5, 11.5], abs=0.3
-    )  # Table 6.4
+    # Table 6.4
+    assert held([0.9, 3.2, -0.4], plate_mass=24.2)[:3] == pytest.approx([7.4, 10.5, 11.5], abs=0.3)
 
 
 def test_the_point_at_rest_is_one():
@@ -82,9 +81,8 @@ def test_static_stiffness_is_that_of_the_arms_seen_through_the_jacobian():
     at_carts = np.diag(np.array(RECORD.arm_stiffness) * np.square(along))  # along guideways, not along links
     stiffness = -RECORD.plate_mass * locked()[3:, :3]
     expected = to_carts.T @ at_carts @ to_carts
-    assert stiffness == pytest.approx(
-        expected, abs=1e-6 * np.abs(expected).max()
-    )  # differences: h2 and 1e-16 / h
+    # differences: h2 and 1e-16 / h
+    assert stiffness == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
 
 
 def test_energy_is_kept_without_damping_and_friction():
@@ -101,9 +99,8 @@ def test_energy_is_kept_without_damping_and_friction():
     elastic += sum(swing[f"arms[{i}].link.energy"] for i in range(3))
     energy = kinetic + fallen + elastic
     assert np.ptp(kinetic) > 1.0  # J: it does move
-    assert np.ptp(energy) < 1e-5 * np.ptp(
-        kinetic
-    )  # ten thousand times the integrator's tolerance, over 3 to 30 swings
+    # ten thousand times the integrator's tolerance, over 3 to 30 swings
+    assert np.ptp(energy) < 1e-5 * np.ptp(kinetic)
 
 
 def test_stiff_arms_and_frame_make_it_the_rigid_robot():
@@ -136,9 +133,8 @@ def test_gauge_moves_by_the_lever_and_accelerometer_reads_acceleration():
     dae = translate(FlexibleGantryTau(RECORD, friction=None, r=PLACE))
     start = dae.evaluate({})
     assert start["gauge.r"] == pytest.approx(PLACE, abs=1e-12)
-    assert start["accelerometer.a"] == pytest.approx(
-        [0.0, 0.0, -9.81], abs=1e-9
-    )  # nothing is stretched yet: free fall
+    # nothing is stretched yet: free fall
+    assert start["accelerometer.a"] == pytest.approx([0.0, 0.0, -9.81], abs=1e-9)
     small = np.array([1e-6, 2e-6, -3e-6])
     there = dae.evaluate(dict(zip(TOOL[:3], PLACE + small, strict=True)))
     assert there["gauge.r"] - PLACE == pytest.approx(RECORD.lever * small, abs=1e-11)  # to first order

@@ -127,9 +127,8 @@ def test_parallelogram_swings_as_a_pendulum():
         lambda t, y: [y[1], -MOMENT * np.cos(y[0]) / SWINGING],
         (0.0, 5.0), [-0.7, 0.0], method="DOP853", rtol=1e-12, atol=1e-12, t_eval=motion.time,
     )  # fmt: skip
-    np.testing.assert_allclose(
-        motion["crank.phi"], swing.y[0], atol=1e-6
-    )  # tolerance times a growing phase error
+    # tolerance times a growing phase error
+    np.testing.assert_allclose(motion["crank.phi"], swing.y[0], atol=1e-6)
 
 
 def test_flat_parallelogram_is_told_as_singular():
@@ -147,7 +146,7 @@ def test_flat_parallelogram_is_told_as_singular():
     np.testing.assert_allclose(before["rocker.phi"], before["crank.phi"], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("start", [-2.0, 0.3, 1.0, 2.9, 7.0])
+@pytest.mark.parametrize("start", [-2.0, 0.3, 7.0])
 def test_parallelogram_starts_parallel(start):
     at = translate(parallelogram(start)).evaluate()
     assert at["crank.phi"] == pytest.approx(start, abs=1e-12)

@@ -273,9 +273,8 @@ def test_evaluate_balances_forces_when_motion_is_given(gt_a):
     np.testing.assert_array_equal(at["der(tool.v)"], 0.0)
     forces = gt_a.function(list(still), FORCES)(*still.values())
     np.testing.assert_allclose([at[n] for n in FORCES], np.ravel(forces), rtol=1e-9)
-    assert sum(at[n] for n in FORCES) == pytest.approx(
-        0.0, abs=1e-9
-    )  # weight has no part along the guideways
+    # weight has no part along the guideways
+    assert sum(at[n] for n in FORCES) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_parameters_are_arguments_by_their_names(gt_a):

@@ -26,10 +26,8 @@ def f1_arms(orientation: Orientation = "local", *, name="F1", gains=False) -> tu
 
 def f1_poses(arms: tuple[ArmClosure, ...], count: int, *, seed: int = 0) -> Poses:
     """Poses of the plate below the carts, carts within 0.4 m of each other, plate turned up to 20 degrees either way."""
-    rng, drawn = (
-        np.random.default_rng(seed),
-        count + count // 20 + 2,
-    )  # two in a hundred are singular or out of reach
+    # two in a hundred are singular or out of reach
+    rng, drawn = (np.random.default_rng(seed), count + count // 20 + 2)
     carts = 0.4 + rng.uniform(-0.2, 0.2, (drawn, 3)) + rng.uniform(-0.35, 0.35, (drawn, 1))
     tilt = np.radians(20.0) * rng.uniform(-1, 1, (drawn, 2))
     q = np.column_stack([carts, tilt[:, 0], -tilt[:, 0], tilt[:, 1]])

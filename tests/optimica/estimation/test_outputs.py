@@ -52,9 +52,8 @@ def test_outputs_of_sizes_one_and_a_millionth(guess):
         best = ROWS @ values / (ROWS @ ROWS)
         spread = np.linalg.norm(values - best * ROWS) / np.sqrt(19 * (ROWS @ ROWS))
         assert fit.parameters[name] == pytest.approx(best, rel=1e-8)
-        assert fit.deviations[name] == pytest.approx(
-            spread, rel=0.02
-        )  # degrees of freedom are shared out: 38 or 2 * 19
+        # degrees of freedom are shared out: 38 or 2 * 19
+        assert fit.deviations[name] == pytest.approx(spread, rel=0.02)
     assert fit.variance == pytest.approx(1.0, rel=1e-3)
 
 

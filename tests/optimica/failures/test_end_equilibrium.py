@@ -72,9 +72,8 @@ def test_a_crank_that_cannot_turn_fully():
     assert "cannot be closed at bar.crank.phi = 2.5, bar.crank.w = 0." in words
     found = re.search(f"open behind bar.crank.phi = {NUMBER}: a singular pose", words)
     assert found is not None
-    assert float(found[1]) == pytest.approx(
-        np.arccos(1 / 3), abs=1e-3
-    )  # four digits are printed, 12 halvings
+    # four digits are printed, 12 halvings
+    assert float(found[1]) == pytest.approx(np.arccos(1 / 3), abs=1e-3)
 
 
 def test_a_delta_robot_out_of_reach_at_the_start():

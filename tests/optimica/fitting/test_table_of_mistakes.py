@@ -65,9 +65,8 @@ def of_experiments():
 
 
 NOISY = 5.0 * np.random.default_rng(9).normal(size=SPEED.shape)
-GRIPS = cache(
-    lambda: of_axes(20 * np.sign(SPEED) * (axes.T > 10)[:, None])
-)  # friction rises in the second half
+# friction rises in the second half
+GRIPS = cache(lambda: of_axes(20 * np.sign(SPEED) * (axes.T > 10)[:, None]))
 STRAY = cache(lambda: of_runs(lambda k, r: 60.0 * (k == 7), 3))
 CELLS = {
     ("wrong model", "identify", "not white"): GRIPS,

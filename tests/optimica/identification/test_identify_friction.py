@@ -114,18 +114,16 @@ def test_weight_is_that_of_virtual_work(load):
 
     slopes = [(tool_z(q + h * e) - tool_z(q - h * e)) / (2 * h) for e in np.eye(3)]
     weights = load.forces(q[None], np.zeros((1, 3)))[0][0]
-    np.testing.assert_allclose(
-        weights, 9.81 * np.array(slopes), atol=1e-3
-    )  # differences of closed links, 1e-12 / h
+    # differences of closed links, 1e-12 / h
+    np.testing.assert_allclose(weights, 9.81 * np.array(slopes), atol=1e-3)
 
 
 def test_positions_of_table_6_2_are_found_in_the_workspace(load):
     """Two unknowns meet three printed digits that sum to zero; for the diamond the assumed guideways leave 17 N."""
     for k, (place, row) in enumerate(zip(poses(), TABLE_6_2, strict=True)):
         weights = MASS * load.forces(carts(*place)[None], np.zeros((1, 3)))[0][0]
-        np.testing.assert_allclose(
-            weights, row, atol=20.0 if k == 3 else 1e-4
-        )  # N; the solver's own tolerance
+        # N; the solver's own tolerance
+        np.testing.assert_allclose(weights, row, atol=20.0 if k == 3 else 1e-4)
 
 
 def test_printed_tables_have_masses_by_norm():

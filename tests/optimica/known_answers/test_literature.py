@@ -103,9 +103,8 @@ def test_refined(problem, value, elements, printed):
     assert found.objective == pytest.approx(value, rel=3e-6 + printed)
     states, end, sizes = driven(found)
     missed = {name: abs(end[k] - found.final(name)) / sizes[k] for k, name in enumerate(states)}
-    assert max(missed.values()) < 1e-5, (
-        missed
-    )  # ten times the accuracy: ends of states without a condition, too
+    # ten times the accuracy: ends of states without a condition, too
+    assert max(missed.values()) < 1e-5, missed
 
 
 def driven(found: Any) -> tuple[list[str], np.ndarray, np.ndarray]:

@@ -56,9 +56,8 @@ def test_hohmann_with_impulses_in_initial_conditions():
     optimum = optimize(Hohmann, elements=20, guess={"body.theta": lambda t: 0.6 * t})
     assert optimum.objective == pytest.approx(hohmann(2.0), abs=1e-6)
     assert optimum["dv"] == pytest.approx(np.sqrt(4 / 3) - 1, abs=1e-4)
-    assert optimum.final_time == pytest.approx(
-        np.pi * 1.5**1.5, abs=1e-2
-    )  # half of the ellipse, a flat minimum
+    # half of the ellipse, a flat minimum
+    assert optimum.final_time == pytest.approx(np.pi * 1.5**1.5, abs=1e-2)
     assert optimum["body.theta"][-1] == pytest.approx(np.pi, abs=1e-2)
 
 

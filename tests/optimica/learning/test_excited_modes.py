@@ -42,9 +42,8 @@ def test_gauge_follows_the_carts_as_the_linear_equations_say():
     left = np.linalg.norm(Y - predicted, axis=0) / np.linalg.norm(Y, axis=0)
     assert left == pytest.approx(np.zeros(3), abs=0.03)  # where it begins has not died out, 1 mm is not small
     held = np.linalg.norm(Y - kinematic_lines(run, lines), axis=0) / np.linalg.norm(Y, axis=0)
-    assert np.all(
-        held > [0.15, 0.5, 0.5]
-    )  # and stiff arms do not explain it, least along x where they are stiffest
+    # and stiff arms do not explain it, least along x where they are stiffest
+    assert np.all(held > [0.15, 0.5, 0.5])
 
 
 def kinematic_lines(run, lines) -> np.ndarray:

@@ -59,9 +59,8 @@ def steps(rig, start, seed, rows=300) -> list[StepResponse]:
 def test_it_rests_where_friction_holds_it(quiet, start):
     still = quiet.run(np.tile(start + 0.05, (100, 1)), seed=3)
     for name in ("tool.r", "gauge.r", "frame.s", *quiet.joints):
-        assert np.ptp(still[name], axis=0) == pytest.approx(
-            0, abs=1e-9
-        )  # m: a thousandth of an encoder's noise
+        # m: a thousandth of an encoder's noise
+        assert np.ptp(still[name], axis=0) == pytest.approx(0, abs=1e-9)
     assert still["measured.q"] == pytest.approx(
         np.column_stack([still[name] for name in quiet.joints]), abs=0
     )
@@ -76,9 +75,8 @@ def test_it_rests_where_friction_holds_it(quiet, start):
 def test_steps_without_friction_have_the_poles_of_the_servos(start):
     model = identify_servo(steps(new_rig(None), start, seed=0)[:3])
     assert model.pole == pytest.approx(POLES, abs=2e-4)
-    assert model.delay == pytest.approx(
-        np.full(3, 3 + 1), abs=0
-    )  # the transport, and one of the speed's loop
+    # the transport, and one of the speed's loop
+    assert model.delay == pytest.approx(np.full(3, 3 + 1), abs=0)
     prompt = identify_servo(steps(new_rig(None, delay=0), start, seed=0)[:3])
     assert prompt.delay == pytest.approx(np.full(3, 1), abs=0)
 
@@ -115,9 +113,8 @@ def test_friction_of_other_runs_is_repeated_to_a_tenth_of_the_error(rubbed, star
         assert np.std(error) < 1e-3
     without = rubbed.run(reference, seed=7)
     error = without["q_ref"][:, 0] - without["carts[0].s"]
-    assert np.std(error) > 3 * np.std(
-        first["q_ref"][:, 0] - first["carts[0].s"]
-    )  # what the speed fed forward is for
+    # what the speed fed forward is for
+    assert np.std(error) > 3 * np.std(first["q_ref"][:, 0] - first["carts[0].s"])
 
 
 def test_accelerations_are_those_of_the_motion_although_servos_shake_with_the_clock(quiet, start):
@@ -142,9 +139,8 @@ def test_readings_have_the_noise_of_their_devices(rubbed, start):
         ("a", run["accelerometer.a"], 0.07),
     ):
         noise = run[f"measured.{read}"] - exact
-        assert np.std(noise, axis=0) == pytest.approx(
-            np.full(3, deviation), rel=0.1
-        )  # of 1000, three in 1/sqrt(2000)
+        # of 1000, three in 1/sqrt(2000)
+        assert np.std(noise, axis=0) == pytest.approx(np.full(3, deviation), rel=0.1)
         assert abs(np.corrcoef(noise.T)[0, 1]) < 0.15
     assert run.unit("measured.a") == "m/s2"
     assert run.unit("carts[0].f") == "N"

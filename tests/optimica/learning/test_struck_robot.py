@@ -38,9 +38,8 @@ def test_a_run_is_what_the_linear_loop_does():
         exact, linear = deflection(rig, push), loop.simulate(push)
         size = np.abs(exact).max()
         assert size > 1e-5
-        assert exact == pytest.approx(
-            np.asarray(linear), abs=2e-3 * size
-        )  # of 0.2 mm on a rod of 2 m, and tolerance
+        # of 0.2 mm on a rod of 2 m, and tolerance
+        assert exact == pytest.approx(np.asarray(linear), abs=2e-3 * size)
 
 
 def test_momentum_comes_before_anything_gives_way():

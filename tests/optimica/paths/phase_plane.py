@@ -99,9 +99,8 @@ class OnPath:
         the limits and those speeds allow (Pham and Pham, 2018, without their assumption that forces are linear in s.^2).
         """
         u = np.linspace(0.0, 1.0, steps + 1)
-        grid = (
-            self.length * u**2 * (3 - 2 * u)
-        )  # finer towards both ends, where speeds grow with the root of s
+        # finer towards both ends, where speeds grow with the root of s
+        grid = self.length * u**2 * (3 - 2 * u)
         h = np.diff(grid)
         known = [self.coefficients(s) for s in grid]
         reachable = np.zeros(steps + 1)  # squares of speeds

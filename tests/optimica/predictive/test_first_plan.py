@@ -78,4 +78,6 @@ def test_a_swing_up_is_planned_from_starts_everywhere():
         mpc.reset()
         mpc.step(dict(zip(("pole.p", "pole.v", "pole.phi", "pole.w"), start.tolist(), strict=True)))
         assert mpc.status == "solved"
-        assert mpc._newton.load(mpc._plan).missed < 1e-6  # a motion of the model
+        assert (plan := mpc._plan)
+        assert (loaded := mpc._newton.load(plan))
+        assert loaded.missed < 1e-6  # a motion of the model

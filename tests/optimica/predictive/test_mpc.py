@@ -8,6 +8,8 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, animate, between, cos, der, sin
+from gantrytau.viewing.film import film_of
+from gantrytau.viewing.solids import ghosts, solids
 from gantrytau_models import DeltaRobot
 from gantrytau_optimica import Free, Mpc, Optimization, at, final, initial, optimize
 
@@ -176,6 +178,14 @@ def test_closed_kinematic_loops_need_nothing_more():
     np.testing.assert_allclose(loop["robot.tool.r"][-1], [0.1, 0.05, -0.75], atol=1e-4)
     assert np.abs(loop["robot.arms[0].tau"]).max() <= 15.0
     assert "Reach, closed loop" in animate(loop).text
+    film = film_of(loop)
+    moving = [solid for solid in solids(film) if solid.role in ("bar", "ball", "body") and not solid.rests]
+    seen = list(ghosts(film))
+    assert film.ghost is not None
+    np.testing.assert_allclose(
+        film.ghost.values("robot.tool.r", (3,))[::12], loop.planned["robot.tool.r"][::10], atol=1e-12
+    )
+    assert {solid.owner for solid in seen} == {s.owner for s in moving if s.kind != "axes"}
 
 
 class FreeEnd(Rest):

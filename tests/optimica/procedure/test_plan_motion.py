@@ -33,9 +33,8 @@ def test_it_passes_all_poses_and_rests_where_it_is_measured(plan):
 def test_the_tool_moves_at_the_speed_that_is_asked_for(plan):
     motion = plan.motion(speed=0.2, rest=0.0)
     way = np.linalg.norm(np.diff(motion["tool.r"], axis=0), axis=1).sum()
-    assert motion.time[-1] == pytest.approx(
-        way / 0.2, rel=0.01
-    )  # but for ways that are shorter than the shortest
+    # but for ways that are shorter than the shortest
+    assert motion.time[-1] == pytest.approx(way / 0.2, rel=0.01)
 
 
 def test_rods_obstacles_and_places_are_seen_and_forces_are_not(plan, tmp_path):

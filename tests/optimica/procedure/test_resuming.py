@@ -14,9 +14,8 @@ from tests.families import first_of
 from tests.optimica.procedure import cells
 from tests.optimica.procedure.cells import varied
 
-planning = import_module(
-    "gantrytau_optimica.procedure.plan_calibration"
-)  # of which the function has the name
+# of which the function has the name
+planning = import_module("gantrytau_optimica.procedure.plan_calibration")
 FEW: dict[str, Any] = dict(poses=9, robots=3, tape=0.003, spacing=0.25)
 
 

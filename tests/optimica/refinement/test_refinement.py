@@ -102,14 +102,12 @@ def test_singular_arcs():
     optimum = held(optimize(CatalystMixing, elements=10, refine=ACCURACY))
     assert optimum.objective == pytest.approx(value, abs=2e-7)
     shares = optimum.signal("tube.u")(np.linspace(0.2, 0.65, 10))
-    np.testing.assert_allclose(
-        shares, np.mean(shares), atol=5e-3
-    )  # constant on the arc, which hardly matters
+    # constant on the arc, which hardly matters
+    np.testing.assert_allclose(shares, np.mean(shares), atol=5e-3)
     rocket = held(optimize(Goddard, elements=20, refine=ACCURACY))
     assert -rocket.objective == near(goddard_by_its_singular_arc())
-    thrust = rocket.signal("rocket.thrust")(
-        np.linspace(0.026, 0.071, 2001)
-    )  # falls or rises on the arc, without teeth
+    # falls or rises on the arc, without teeth
+    thrust = rocket.signal("rocket.thrust")(np.linspace(0.026, 0.071, 2001))
     assert np.sum(np.abs(np.diff(thrust))) < 1.05 * np.ptp(thrust)
 
 
@@ -122,9 +120,6 @@ def test_the_robot_on_a_straight_line():
     assert np.max(np.abs(optimum.playback["torque"])) <= LIMIT * (1 + 2 * ACCURACY)
     # played back, it arrives within 10 micrometres
     assert np.linalg.norm(optimum.playback["robot.tool.r"][-1] - [1.711, 3.46, -0.24]) < 1e-5
-
-
-UNMOVED = "refinement._holds: where nothing errs the second mesh is the first, so the objective 'stands still' unchecked"
 
 
 @pytest.mark.parametrize(

@@ -58,9 +58,8 @@ def solver_of(at: int, max_time: float, progress=None):
     prepared = prepare(FastestMass, elements=10)
     program = prepared.program
     assembled = replace(program.assembled)
-    vars(assembled)["hess_lag"] = Slow(
-        program.assembled.hess_lag, at
-    )  # in place of the one that it would make
+    # in place of the one that it would make
+    vars(assembled)["hess_lag"] = Slow(program.assembled.hess_lag, at)
     program = replace(program, assembled=assembled)
     settings = replace(prepared.solver.settings, max_time=max_time, progress=progress)
     return program, Solver(program, settings)

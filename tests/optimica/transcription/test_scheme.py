@@ -14,11 +14,8 @@ from gantrytau_optimica.transcription.transcribe import METHODS, Scheme
 from tests.optimica.problems import FastestMass
 from tests.optimica.studies.test_sensitivities import Carried
 
-LOST: dict[Scheme, int] = {
-    "gauss": 0,
-    "radau": 1,
-    "lobatto": 2,
-}  # of the order 2 k, by an end or two that are given
+# of the order 2 k, by an end or two that are given
+LOST: dict[Scheme, int] = {"gauss": 0, "radau": 1, "lobatto": 2}
 CASES = [(scheme, k) for scheme in LOST for k in range(METHODS[scheme].least, 6)]
 
 
@@ -145,6 +142,5 @@ def test_an_optimum_by_lobatto_is_read_refined_and_saved(tmp_path):
 def test_multipliers_of_conditions_by_lobatto_are_sensitivities():
     found = optimize(Carried, scheme="lobatto", elements=20, tolerance=1e-12)
     by = sensitivities(found, ["way", "mass", "force"])
-    assert by.objective["way"] == pytest.approx(
-        found.final_time / (2 * 3.0), rel=1e-6
-    )  # T = 2 sqrt(way mass / force)
+    # T = 2 sqrt(way mass / force)
+    assert by.objective["way"] == pytest.approx(found.final_time / (2 * 3.0), rel=1e-6)

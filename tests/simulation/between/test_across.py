@@ -6,10 +6,8 @@ import pytest
 from gantrytau import DoubtfulResult, Model, ModelError, Real, SolveError, cos, der, simulate, sin, translate
 
 N = 2  # windows
-TOP = (
-    -0.1950203019,
-    -0.9807992057,
-)  # of the first upright after 1 s: a pendulum, I = (N + 1)/3 + N, by its own equation
+# of the first upright after 1 s: a pendulum, I = (N + 1)/3 + N, by its own equation
+TOP = (-0.1950203019, -0.9807992057)
 
 
 class Windows(Model):

@@ -95,9 +95,8 @@ def test_the_delayed_logistic_equation_is_that_of_scipy_step_by_step():
 def test_a_delay_much_shorter_than_the_run_decays_with_its_root():
     motion = simulate(Oscillator(T=0.01), stop=5.0)
     root = np.real(lambertw(-0.01)) / 0.01  # s + exp(-s T) = 0
-    assert (
-        abs(motion.final("x") / motion["x"][250] / np.exp(2.5 * root) - 1) < 1e-6
-    )  # 500 delays, each of some tolerance
+    # 500 delays, each of some tolerance
+    assert abs(motion.final("x") / motion["x"][250] / np.exp(2.5 * root) - 1) < 1e-6
 
 
 def test_chains_and_vectors_of_delays_are_what_went_in():

@@ -63,9 +63,8 @@ def test_a_step_has_order_eight_and_estimates_of_its_error():
             fifth.append(abs(float(e5)))
         errors.append(abs(float(at) - np.exp(np.sin(2.0))))
     assert 7.5 < np.log2(errors[0] / errors[1]) < 9.5
-    assert (
-        np.log2(max(fifth[:4]) / max(fifth[4:])) > 4.5
-    )  # a rate: one less than the order of the step's own error
+    # a rate: one less than the order of the step's own error
+    assert np.log2(max(fifth[:4]) / max(fifth[4:])) > 4.5
 
 
 class Oscillator(Model):

@@ -12,9 +12,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-PLACES = 0.5 - 0.5 * np.cos(
-    np.pi * np.arange(17) / 16
-)  # Chebyshev's extremes: interpolation between them converges
+# Chebyshev's extremes: interpolation between them converges
+PLACES = 0.5 - 0.5 * np.cos(np.pi * np.arange(17) / 16)
 CLOSE = 0.1  # of its size: by how much a first sweep may change a state
 SETTLED = 1e-12  # of its size: the last change of a state that is left to rounding
 STILL = 1e-8  # the same of an algebraic, by its largest value

@@ -19,9 +19,8 @@ from gantrytau_optimica.calibration.fitting.covariance import pose_noise
 from gantrytau_optimica.calibration.fitting.rod_fit import Fit
 from gantrytau_optimica.fitting.diagnostics import ResidualSeries
 
-SMOOTHER = (
-    2.0  # times the variance that a cause leaves, which smooth functions of the pose must leave at the least
-)
+# times the variance that a cause leaves, which smooth functions of the pose must leave at the least
+SMOOTHER = 2.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -224,9 +224,8 @@ def aliased(q: Array, pitch: float | None, rows: Array) -> list[Finding]:
         alike[part] = np.maximum(np.abs(wave @ longer), np.abs(wave @ longer.conj())) / len(q)
     if not alike.size or alike.max() < ALIASED:
         return []
-    first = int(
-        np.argmax(alike >= ALIASED)
-    )  # the longest of those that look alike; its peak spans eight places
+    # the longest of those that look alike; its peak spans eight places
+    first = int(np.argmax(alike >= ALIASED))
     period = 1 / frequencies[first + int(np.argmax(alike[first : first + 8]))]
     words = (
         f"at these positions a wave of the pitch of {1e3 * pitch:.3g} mm looks like one of {1e3 * period:.3g} mm; measure "

@@ -219,9 +219,8 @@ def orientation_causes(robot: Model | Kinematics, q: Any, r: Any, R: Any, *, deg
 def _by_closure(geometry: RodGeometry, q: Array, r: Array, R: Array, degree: int) -> Causes:
     length, u, by_pose, _ = geometry.slopes(q, r, R)
     missed = length - geometry.length
-    first, second = np.zeros(
-        (2, *missed.shape, 2)
-    )  # links, guideways; the last axis: which of them had the choice
+    # links, guideways; the last axis: which of them had the choice
+    first, second = np.zeros((2, *missed.shape, 2))
     unknowns = np.zeros((2, 2))
     for arm in range(3):
         links = geometry.links_of(arm)

@@ -65,9 +65,8 @@ def fit_arm(
     order = [group.names.index(name) for name in arm.names]
     found = arm.moved((fit.x - group.x)[order])
     residuals = found.closure(*data)[0]
-    degrees = max(
-        1.0, len(residuals) - arm.count / len(arm.lengths)
-    )  # links have their shares of the unknowns
+    # links have their shares of the unknowns
+    degrees = max(1.0, len(residuals) - arm.count / len(arm.lengths))
     return ArmFit(
         arm=found,
         iterations=fit.minimum.iterations,

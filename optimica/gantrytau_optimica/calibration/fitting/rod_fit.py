@@ -123,9 +123,8 @@ def _by_tape(
         minimum, before = rows.minimum(group.x, noise, [tape]), noise
         left, J = minimum.residuals[: -len(free)], minimum.jacobian[: -len(free)]
         squares = np.linalg.svd(J, compute_uv=False) ** 2
-        told = float(
-            np.sum(squares / np.maximum(squares + limit**2, 1e-300))
-        )  # how many parameters data tell
+        # how many parameters data tell
+        told = float(np.sum(squares / np.maximum(squares + limit**2, 1e-300)))
         noise = float(np.sqrt(left @ left / max(1.0, group.count - told)))
         noise = _without_strays(group, minimum.x, weights, noise)
         if smallest is not None or abs(noise - before) <= SETTLED * before or rounds == NOISES:

@@ -152,9 +152,8 @@ class CalibratedKinematics:
             )
             step = newton_steps(self._by_pose(q, r, R), error)
             size = np.abs(step).max(axis=1)
-            step = (
-                step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
-            )  # half a metre or radian at once
+            # half a metre or radian at once
+            step = step * np.minimum(1.0, 0.5 / np.maximum(size, 1e-300))[:, None]
             r -= step[:, :3]
             R = of_vectors(-step[:, 3:]) @ R
             if not np.any(size > REACHED):

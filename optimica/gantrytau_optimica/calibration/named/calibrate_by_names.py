@@ -49,9 +49,8 @@ def usable(
             f"calibrate: found measurements of {measurements.q.shape[1]} joints for {tool.dae.name}, expected "
             f"{len(tool.joints)}: {', '.join(tool.joints)}; check the columns q1, q2, ..., or name joints="
         )
-    findings = [
-        f for f in measurements.findings if f.kind not in ("plane", "line")
-    ]  # SCARA and five bars work in a plane
+    # SCARA and five bars work in a plane
+    findings = [f for f in measurements.findings if f.kind not in ("plane", "line")]
     rows = usable_rows(findings, measurements)
     there = np.isfinite(tool(measurements.q[rows], tool.nominal)[0]).all(axis=1)
     if not there.all():

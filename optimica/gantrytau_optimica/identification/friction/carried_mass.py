@@ -18,9 +18,8 @@ from gantrytau.dae import Dae
 from gantrytau.describing.record import Record
 
 PLATE = ("plate_mass", "platform.m", "tool.m")  # what robots call it
-NO_LOAD = re.compile(
-    r"\.(link_mass|(f|tau)_[cvs])(\[\d+\])?$"
-)  # links, and what laws of friction call their parameters
+# links, and what laws of friction call their parameters
+NO_LOAD = re.compile(r"\.(link_mass|(f|tau)_[cvs])(\[\d+\])?$")
 
 
 @dataclass(frozen=True, eq=False)

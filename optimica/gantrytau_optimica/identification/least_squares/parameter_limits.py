@@ -31,9 +31,8 @@ class Condition:
     def interior(self, p: np.ndarray) -> np.ndarray:
         """Values at these places by which the matrix is positive definite, as close to p as it takes."""
         second = np.zeros(self.constant.shape)
-        second[range(len(second) - 1), range(len(second) - 1)] = (
-            1.0  # a body that is larger in all directions
-        )
+        # a body that is larger in all directions
+        second[range(len(second) - 1), range(len(second) - 1)] = 1.0
         away = np.linalg.lstsq(self.slopes.reshape(len(self.places), -1).T, second.ravel(), rcond=None)[0]
         begin, share = self.at(p), 1e-6 * max(np.trace(self.at(p) * second), 0.01 * self.at(p)[-1, -1])
         while np.linalg.eigvalsh(begin + share * second)[0] <= 1e-3 * share:

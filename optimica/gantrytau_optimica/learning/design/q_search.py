@@ -17,10 +17,8 @@ MIDDLE = 0.45  # of the sampling frequency, below which filters lie
 INSIDE = 0.995  # of the margin, at which the penalty begins at first
 ROUNDS = (10.0, 100.0, 1e3, 1e4)  # of the penalty
 BACK = 0.999  # of the cut-off, by which filters are closed at least in each step until they hold
-HELD, BELOW = (
-    5,
-    0.999,
-)  # times that the penalty is moved inside; times the margin, for what is between frequencies
+# times that the penalty is moved inside; times the margin, for what is between frequencies
+HELD, BELOW = (5, 0.999)
 CLOSED = 300  # such steps at most
 
 
@@ -136,9 +134,8 @@ def _opened(problem: QProblem, p: np.ndarray, rounds: tuple[float, ...], inside:
     from scipy.optimize import minimize
 
     x, weights, left, most = problem.x, problem.weights, problem.left, problem.most
-    grams = np.einsum(
-        "kfij,kfil->kfijl", left.conj(), left
-    )  # sigma^2 is the largest eigenvalue of sum q_i^2 of these
+    # sigma^2 is the largest eigenvalue of sum q_i^2 of these
+    grams = np.einsum("kfij,kfil->kfijl", left.conj(), left)
     rows, limit = np.einsum("kfijj->kfi", grams).real, inside * problem.margin
 
     def cost(p: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:

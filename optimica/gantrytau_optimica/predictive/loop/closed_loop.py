@@ -22,11 +22,12 @@ SHOWN = 12  # plans in a figure
 
 @dataclass(frozen=True, eq=False)
 class LoopEnd:
-    """Where a loop with a model ended. controller: its `key`; made: its plans; applied: inputs of the last
-    step; now, waiting: those held, and those that follow; motion: of the plant, scaled; random: state of the noise.
+    """Where a loop with a model ended. controller: its `key`; plan: its last; made: all, without stages; applied: inputs of
+    the last step; now, waiting: those held, and those that follow; motion: of the plant, scaled; random: state of the noise.
     """
 
     controller: tuple[Any, ...]
+    plan: PlannedMotion | None
     made: tuple[PlannedMotion, ...]
     applied: Mapping[str, float]
     now: Mapping[str, float]
@@ -41,7 +42,8 @@ class ClosedLoop(Record):
 
     result: all variables of the plant at the samples, inputs held; statuses: of the controller at each sample; timing: of
     its steps; cost: the integral of the problem's integrand along the motion; estimates: what an estimator gave at each
-    sample but the last, by name; parameters: of the plant. plans: at each sample but the last the plan made there, name ->
+    sample but the last, by name; parameters: of the plant, or, if it does not tell them, of
+    the controller's model. plans: at each sample but the last the plan made there, name ->
     (samples, elements + 1), of states and inputs; planned: all variables at the ends of these plans, at the samples.
     record: of a plant that runs by itself, what it returned.
     """

@@ -19,9 +19,8 @@ from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.vision.boards import Pattern
 
 Array = np.ndarray
-AHEAD = np.array(
-    [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
-)  # the pattern looks along x of the plate
+# the pattern looks along x of the plate
+AHEAD = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 LINK = 0.02  # m, radius of a link
 GREATEST = {8: 255, 16: 65535}
 

@@ -109,9 +109,8 @@ def test_d_optimal_poses_are_that_but_for_what_was_given_away(robot, candidates)
         if exchange is None:
             break
         rows = exchange
-    assert information(jacobians, select_poses(robot, candidates, 40)) > best - 21 * (
-        0.014 + 0.007
-    )  # slack, and luck
+    # slack, and luck
+    assert information(jacobians, select_poses(robot, candidates, 40)) > best - 21 * (0.014 + 0.007)
 
 
 def test_the_least_error_of_all_choices_is_nearly_found(robot):
@@ -217,9 +216,8 @@ def test_more_poses_predict_less_error_by_the_square_root(robot, candidates):
 def test_enough_poses_are_about_the_fewest(robot, candidates):
     rows = enough_poses(robot, candidates, 5e-6)
     assert predict(robot, candidates, rows).error <= 5e-6
-    fewer = select_poses(
-        robot, candidates, 4 * len(rows) // 5
-    )  # five for one in twenty, as exchanges end unlike
+    # five for one in twenty, as exchanges end unlike
+    fewer = select_poses(robot, candidates, 4 * len(rows) // 5)
     assert predict(robot, candidates, fewer).error > 5e-6
 
 

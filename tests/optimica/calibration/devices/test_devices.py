@@ -94,9 +94,8 @@ def test_the_same_seed_gives_the_same_noise():
 def test_a_scale_does_not_average_out_and_noise_does():
     tracker, r = LaserTracker(r=[-4.0, 0.0, 0.0], scale=1e-5), np.zeros((MANY, 3))
     error = (tracker.measure(r).r - r).mean(axis=0)
-    assert error[0] == pytest.approx(
-        4e-5, abs=5 * 5.6e-6 / np.sqrt(MANY)
-    )  # five standard deviations of the mean
+    # five standard deviations of the mean
+    assert error[0] == pytest.approx(4e-5, abs=5 * 5.6e-6 / np.sqrt(MANY))
     assert np.abs(error[1:]).max() < 5 * 19.5e-6 / np.sqrt(MANY)
 
 
@@ -168,9 +167,8 @@ def test_slopes_of_images_against_differences():
     for k in range(3):
         shift = step * np.eye(3)[k]
         difference = (camera.project(points + shift) - camera.project(points - shift)) / (2 * step)
-        assert slopes[..., k] == pytest.approx(
-            difference, abs=1e-4
-        )  # pixel/m, of 900; rounding 1e-12 / 1e-6 * 1e3
+        # pixel/m, of 900; rounding 1e-12 / 1e-6 * 1e3
+        assert slopes[..., k] == pytest.approx(difference, abs=1e-4)
 
 
 def test_a_camera_looks_where_it_is_told_with_up_in_the_image_up():

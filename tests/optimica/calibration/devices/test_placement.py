@@ -54,17 +54,15 @@ def test_a_tracker_is_placed_where_its_beam_is_short():
     far, near = (LaserTracker((d, 0.0, 0.0)) for d in (20.0, 5.0))
     found = place_device([far, near], np.zeros((1, 3)))
     assert found.best is near
-    across = (
-        7.5e-6 + 5 * 3e-6
-    )  # of the manual, in each of two directions, and along the beam 5 um + 0.15 um/m
+    # of the manual, in each of two directions, and along the beam 5 um + 0.15 um/m
+    across = 7.5e-6 + 5 * 3e-6
     assert found.error[1] == pytest.approx(np.hypot(np.sqrt(2) * across, 5e-6 + 5 * 0.15e-6), rel=1e-12)
 
 
 def test_candidates_that_cannot_be_placed():
     place: Any = place_device
-    edge = Cameras(
-        cameras=[PlacedCamera.looking(MIDDLE + np.array([0, 4, 0]), MIDDLE)]
-    )  # sees the pattern from its edge
+    # sees the pattern from its edge
+    edge = Cameras(cameras=[PlacedCamera.looking(MIDDLE + np.array([0, 4, 0]), MIDDLE)])
     assert place([edge, pair(4.0)], MIDDLE, LOOKS_ALONG_X).order.tolist() == [1, 0]
     for wrong in ([], [3], pair(4.0), [edge]):
         with pytest.raises(ModelError) as refusal:

@@ -75,9 +75,8 @@ def test_a_drift_that_settles_and_one_in_the_order_of_the_places():
     t = np.linspace(0, 1, 60)
     robot, q, r, R = l1()
     settled = found_in(robot, q, moved(r, OFF * (1 - np.exp(-5 * t)), 2), R)["drift"]
-    assert size(r"drift by ([\d.]+) mm", settled) == pytest.approx(
-        1.0, abs=0.1
-    )  # a polynomial of the third degree
+    # a polynomial of the third degree
+    assert size(r"drift by ([\d.]+) mm", settled) == pytest.approx(1.0, abs=0.1)
     robot, q, r, R = l1(mixed=False)
     drift = found_in(robot, q, moved(r, OFF * t), R)["drift"]
     assert size(r"drift by ([\d.]+) mm", drift) == pytest.approx(1.0, abs=0.1)  # hardly told from the numbers

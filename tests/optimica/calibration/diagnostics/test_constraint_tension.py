@@ -67,9 +67,8 @@ def test_a_wrong_prior_is_told_however_tight(loss):
     for deviation in (1e-9, 1e-4):
         found = calibrate(nominal(2e-3), measured(), prior={LENGTH: (TRUE + 1e-3, deviation)}, loss=loss)
         message, deviations = told(found, "prior")
-        assert deviations == pytest.approx(
-            1e-3 / np.hypot(90e-6, deviation), rel=0.3
-        )  # as L is known without it
+        # as L is known without it
+        assert deviations == pytest.approx(1e-3 / np.hypot(90e-6, deviation), rel=0.3)
         assert message.startswith("data want arms[0].length at 2.060")
         assert f"the prior {TRUE + 1e-3:.7g} +- {deviation:g} holds it" in message
         assert message.endswith("look at its value, or give it a larger deviation")

@@ -126,9 +126,8 @@ def test_the_straightness_is_the_height_of_the_bend(found):
     q = np.linspace(0.0, 2.0, 2001)
     line = np.column_stack([np.ones(2001), q])
     true = bend(q) - line @ np.linalg.lstsq(line, bend(q), rcond=None)[0]
-    assert found.straightness == pytest.approx(
-        np.ptp(true, axis=0), abs=8e-6
-    )  # three standard errors at the ends
+    # three standard errors at the ends
+    assert found.straightness == pytest.approx(np.ptp(true, axis=0), abs=8e-6)
 
 
 def test_the_direction_of_motion_follows_from_the_order():
@@ -175,9 +174,8 @@ def test_the_spectrum_has_its_peak_at_the_pitch(found):
     blind = linearity(q, points)  # does not know of the pitch
     periods = 1 / np.linspace(1 / 0.05, 1 / 0.008, 2000)
     amplitude = blind.spectrum(periods)
-    assert periods[np.argmax(amplitude[:, 0])] == pytest.approx(
-        PITCH, rel=2e-3
-    )  # a quarter of its width, 1 / 162
+    # a quarter of its width, 1 / 162
+    assert periods[np.argmax(amplitude[:, 0])] == pytest.approx(PITCH, rel=2e-3)
     assert blind.spectrum(PITCH)[0] == pytest.approx(waves(found).amplitude[0], abs=4 * 5e-7)
     assert np.max(amplitude[:, 1:]) < WAVE / 10
 
@@ -324,7 +322,6 @@ def test_figures_are_written(found, tmp_path):
     for name, draw in (
         ("errors.png", found.plot),
         ("backlash.png", found.plot_backlash),
-        ("spectrum.png", lambda file: found.plot_spectrum(np.linspace(0.008, 0.05, 100), file=file)),
     ):
         draw(file=tmp_path / name)
         assert (tmp_path / name).stat().st_size > 5000

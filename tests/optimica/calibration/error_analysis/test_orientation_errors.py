@@ -20,9 +20,8 @@ from tests.optimica.refusals import refused
 
 matplotlib.use("Agg")
 
-ALONG = np.mean(
-    [arm.direction for arm in prototypes.D1.arms], axis=0
-)  # the frame of the tracker is 4 deg off
+# the frame of the tracker is 4 deg off
+ALONG = np.mean([arm.direction for arm in prototypes.D1.arms], axis=0)
 
 
 def grid() -> np.ndarray:
@@ -141,9 +140,8 @@ def test_a_link_that_is_too_long(level, link):
     assert causes.shares["links"] > 0.95
     made = level.fk(q)[1]
     found = orientation_errors(r, R @ np.swapaxes(made, 1, 2), reference=np.eye(3)).turns
-    assert causes.links == pytest.approx(
-        found - found.mean(axis=0), abs=5e-5
-    )  # a twentieth of 200 um over 0.2 m
+    # a twentieth of 200 um over 0.2 m
+    assert causes.links == pytest.approx(found - found.mean(axis=0), abs=5e-5)
 
 
 @pytest.mark.parametrize("arm", [1, 2])

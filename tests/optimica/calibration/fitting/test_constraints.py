@@ -55,9 +55,8 @@ def test_a_limit_holds_and_moves_the_others_as_their_covariance_says(data):
     moved = np.concatenate([np.atleast_1d(found.parameters[n] - free.parameters[n]) for n in names])
     # of one link the covariance is s^2 (J'J)^-1: the minimum with one number held is elsewhere by C e / C_11
     assert moved == pytest.approx(3e-5 * C[:, 0] / C[0, 0], abs=1e-7)
-    assert found.deviations["arms[0].length"] == pytest.approx(
-        0.0, abs=1e-9
-    )  # a ten-thousandth of what it was
+    # a ten-thousandth of what it was
+    assert found.deviations["arms[0].length"] == pytest.approx(0.0, abs=1e-9)
     assert np.all(np.sqrt(np.diag(found.covariance(names))) <= 1.0001 * np.sqrt(np.diag(C)))
 
 

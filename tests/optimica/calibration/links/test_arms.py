@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import Array, Model, ModelError, Parameter, SolveError
-from gantrytau.kinematics.rotations import of_vectors, rotation_vector
+from gantrytau.kinematics.rotations import of_vectors
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.fitting.ipopt_fit import solve
@@ -51,9 +51,8 @@ def disturbed(arm, *, seed: int, size: float = 2e-3):
 @pytest.mark.parametrize("orientation", ORIENTATIONS)
 def test_the_thesis_counts_10_24_and_38_parameters(orientation):
     arms = f1_arms(orientation)
-    assert (
-        tuple(arm.count for arm in arms) == COUNTS[orientation]
-    )  # a local rotation has one less than a quaternion
+    # a local rotation has one less than a quaternion
+    assert tuple(arm.count for arm in arms) == COUNTS[orientation]
     assert all(len(set(arm.names)) == arm.count == len(arm.vector) for arm in arms)
 
 
@@ -76,9 +75,8 @@ def test_jacobian_is_that_of_differences(orientation, robot):
         steps = 1e-6 * np.eye(arm.count)
         ends = [[arm.moved(h * step).closure(q, r, R)[0] for h in (1.0, -1.0)] for step in steps]
         differences = np.stack([(after - before) / 2e-6 for after, before in ends], axis=-1)
-        np.testing.assert_allclose(
-            J, differences, atol=1e-8, rtol=0
-        )  # 1e-6 squared, and 1e-16 / 1e-6 by size 10
+        # 1e-6 squared, and 1e-16 / 1e-6 by size 10
+        np.testing.assert_allclose(J, differences, atol=1e-8, rtol=0)
 
 
 @pytest.mark.parametrize("robot", ["D1", "F1"])
@@ -113,12 +111,6 @@ def test_a_quaternion_of_any_length_is_a_matrix_as_the_thesis_has_it():
     np.testing.assert_allclose(
         rotation(unit), Rotation.from_quat(unit, scalar_first=True).as_matrix(), atol=1e-15
     )
-
-
-def test_rotation_vectors_come_back():
-    vectors = np.array([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.3, -0.2, 0.1], [2.0, 1.0, -1.5]])
-    np.testing.assert_allclose(rotation_vector(of_vectors(vectors)), vectors, atol=1e-14)
-    np.testing.assert_allclose(of_vectors(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-15)
 
 
 @pytest.mark.parametrize("orientation", ORIENTATIONS)

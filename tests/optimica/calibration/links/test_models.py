@@ -130,11 +130,8 @@ def test_kinematics_of_measured_guideways_go_back_and_forth(d1):
     slopes = kinematics.jacobian(r, R)
     assert slopes.shape == (20, 6, 6)
     moved = kinematics.ik(r + np.array([step, 0, 0]), R) - kinematics.ik(r, R)
-    arms = [
-        0,
-        1,
-        3,
-    ]  # the first link of each; the mean of an arm's links moves alike when the plate does not turn
+    # the first link of each; the mean of an arm's links moves alike when the plate does not turn
+    arms = [0, 1, 3]
     assert slopes[:, arms, 0] == pytest.approx(moved / step, abs=2e-2)
 
 

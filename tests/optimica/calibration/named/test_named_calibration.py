@@ -100,9 +100,8 @@ def test_true_values_are_found_within_three_deviations(name):
     assert found.rank == len(found.names) == 6 + len(values)
     elements = _elements(parameters)
     off = np.array([found.minimum.x[found.names.index(n)] for n in elements]) - values
-    assert np.all(
-        np.abs(off) < 3.5 * np.array([found.deviations[n] for n in elements])
-    )  # of 4 in 2,000 seeds
+    # of 4 in 2,000 seeds
+    assert np.all(np.abs(off) < 3.5 * np.array([found.deviations[n] for n in elements]))
     assert found.findings == ()
     # three coordinates of 10 um are 16 um in the mean, beside what 30 poses leave of the parameters
     assert 12e-6 < found.error < 24e-6

@@ -45,9 +45,8 @@ def test_forces_in_another_unit_are_told_with_their_ratio(robot, log, factor, wo
     assert found.kind == "unit of force"
     assert words in found.message
     ratio = float(found.message.split()[2])
-    assert max(factor, 1 / factor) == pytest.approx(
-        ratio, rel=0.05
-    )  # noise and smoothing; sizes are what is told
+    # noise and smoothing; sizes are what is told
+    assert max(factor, 1 / factor) == pytest.approx(ratio, rel=0.05)
 
 
 def test_forces_of_the_opposite_sign_are_told(robot, log):

@@ -20,9 +20,8 @@ def ring(hertz, damping, size=1.0, phase=0.0):
 @pytest.mark.parametrize("phase", [0.0, 0.7, np.pi / 2])
 def test_one_ring(hertz, damping, phase):
     found = resonances(ring(hertz, damping, 1e-6, phase) + 3.0, PERIOD, share=0.5)
-    assert found == pytest.approx(
-        [hertz], rel=3 * damping**2 + 0.006
-    )  # the peak is beside the pole by its damping
+    # the peak is beside the pole by its damping
+    assert found == pytest.approx([hertz], rel=3 * damping**2 + 0.006)
 
 
 def test_the_strongest_comes_first_and_later_samples_show_what_lasts():

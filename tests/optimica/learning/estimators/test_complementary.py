@@ -41,9 +41,8 @@ def test_kinematics_rule_slow_motion_and_the_accelerometer_quick_one():
     for f in (0.5, 2.0, HZ, 10.0, 40.0):
         z = np.cos(2 * np.pi * f * t)
         a = -((2 * np.pi * f) ** 2) * z
-        gain = 1 / (
-            1 + (np.tan(np.pi * f * PERIOD) / np.tan(np.pi * HZ * PERIOD)) ** 4
-        )  # bilinear Butterworth, twice
+        # bilinear Butterworth, twice
+        gain = 1 / (1 + (np.tan(np.pi * f * PERIOD) / np.tan(np.pi * HZ * PERIOD)) ** 4)
         for found, expected in ((combined(z, 0 * a), gain), (combined(0 * z, a), 1 - gain)):
             np.testing.assert_allclose(found[inside], expected * z[inside], atol=2e-4)
     still = np.full(1200, 0.3)

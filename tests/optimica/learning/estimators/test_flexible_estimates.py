@@ -71,9 +71,8 @@ def test_a_model_knows_more_than_an_accelerometer_and_this_more_than_encoders(tr
     assert np.all(complementary[:, 1] < 0.7 * kinematic[:, 1])
     assert np.all(kalman[:, 1] < 0.7 * complementary[:, 1])
     assert np.all(kalman[:, 1:] < complementary[:, 1:])
-    assert np.all(
-        kalman[:, 0] < 1.1 * complementary[:, 0]
-    )  # along x the frame sways, which accelerometers feel
+    # along x the frame sways, which accelerometers feel
+    assert np.all(kalman[:, 0] < 1.1 * complementary[:, 0])
     assert np.all(complementary < kinematic)
 
 

@@ -43,9 +43,8 @@ def test_one_wrong_image_is_told_and_costs_the_others_nothing(images, pixels, co
     found = reconstruct(wrong(images, pixels), BOTH, corners=corners)
     assert [finding.kind for finding in found.findings] == ["stray image"]
     assert found.findings[0].rows.tolist() == [SHIFTED]
-    camera = (
-        "camera 1 does" if pixels in (0.0, 20.0, 50.0) else "camera 1 or 2 does"
-    )  # a slight shift is a motion
+    # a slight shift is a motion
+    camera = "camera 1 does" if pixels in (0.0, 20.0, 50.0) else "camera 1 or 2 does"
     assert f"row 5: the image of {camera} not belong to this pose" in str(found)
     assert not found.found[SHIFTED]
     others = np.delete(np.arange(POSES), SHIFTED)
