@@ -328,6 +328,23 @@ def test_a_derivative_whose_factor_is_evaluated_to_zero_asks_for_none(tmp_path):
     assert [max(translate(made(c=c)).indexed.counts) for c in (0, 2)] == [0, 1]
 
 
+def test_a_copy_of_a_library_that_is_too_old_or_not_whole_is_told(tmp_path):
+    (tmp_path / "Lib" / "Parts").mkdir(parents=True)
+    order, package = tmp_path / "Lib" / "package.order", tmp_path / "Lib" / "package.mo"
+    order.write_text("k\nParts\n")
+    package.write_text('package Lib\n constant Real k = 3;\n annotation(version="3.2.3");\nend Lib;')
+    use = tmp_path / "use.mo"
+    text = 'model Use\n Lib.Parts.Lag lag;\n annotation(uses(Lib(version="{}")));\nend Use;'
+    for asked, words in (
+        ("4.0.0", r"^found Lib of version 3\.2\.3 in .*Lib, expected 4\.0\.0 or later, which Use uses"),
+        ("3.2", r"Lib: found no Parts\.mo and no folder Parts with package\.mo, expected one"),
+        ("3.2.3", "this copy of the package is not whole$"),
+    ):
+        use.write_text(text.format(asked))
+        with pytest.raises(ModelError, match=words):
+            load_modelica(use, libraries=[tmp_path])["Use"]
+
+
 def test_of_several_versions_of_a_library_the_latest_is_taken(tmp_path):
     for version in ("9.0", "10.0"):
         folder = tmp_path / f"L {version}"
@@ -348,20 +365,3 @@ def test_of_several_versions_of_a_library_the_latest_is_taken(tmp_path):
 def test_a_sum_of_a_machine_has_as_many_terms_as_it_likes(tmp_path):
     (tmp_path / "m.mo").write_text(f"model M\n  Real x = {' + '.join(['time'] * 2000)};\nend M;")
     assert simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=1.0).final("x") == 2000
-
-
-def test_a_copy_of_a_library_that_is_too_old_or_not_whole_is_told(tmp_path):
-    (tmp_path / "Lib" / "Parts").mkdir(parents=True)
-    order, package = tmp_path / "Lib" / "package.order", tmp_path / "Lib" / "package.mo"
-    order.write_text("k\nParts\n")
-    package.write_text('package Lib\n constant Real k = 3;\n annotation(version="3.2.3");\nend Lib;')
-    use = tmp_path / "use.mo"
-    text = 'model Use\n Lib.Parts.Lag lag;\n annotation(uses(Lib(version="{}")));\nend Use;'
-    for asked, words in (
-        ("4.0.0", r"^found Lib of version 3\.2\.3 in .*Lib, expected 4\.0\.0 or later, which Use uses"),
-        ("3.2", r"Lib: found no Parts\.mo and no folder Parts with package\.mo, expected one"),
-        ("3.2.3", "this copy of the package is not whole$"),
-    ):
-        use.write_text(text.format(asked))
-        with pytest.raises(ModelError, match=words):
-            load_modelica(use, libraries=[tmp_path])["Use"]

@@ -293,7 +293,7 @@ def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassSc
     older: list[str] = []
     for folder in folders:
         versions = [p for p in folder.glob(f"{name} *") if (p / "package.mo").is_file()]
-        versions.sort(key=lambda p: _numbers(p.name.rpartition(" ")[2]), reverse=True)
+        versions.sort(key=lambda p: _numbers(p.name.partition(" ")[2]), reverse=True)
         for place in [folder / name] if (folder / name / "package.mo").is_file() else versions[:1]:
             found = package_in(place, root)
             here = version_of(found.definition)
