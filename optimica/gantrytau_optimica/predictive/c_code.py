@@ -11,7 +11,7 @@ from gantrytau import ModelError
 from gantrytau.answers.c_code import c_source
 from gantrytau.answers.sampled_code import SampledCode
 from gantrytau_optimica.predictive.horizon_qp import RIDGE
-from gantrytau_optimica.predictive.plan import PlannedMotion
+from gantrytau_optimica.predictive.plan import APART, PlannedMotion
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
 
@@ -48,7 +48,7 @@ def controller_code(
         PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size, NK=len(known),
         NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.any()),
         END=int(mpc.terminal.there), DELAY=mpc.delay, PENALTY=float(penalty), RIDGE=RIDGE,
-        TURNS=TURNS, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
+        TURNS=TURNS, APART=APART, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
         FIRST=limits[0], ITERATIONS=limits[1], STANDS=limits[2],
     )  # fmt: skip
     point = stage_point(stages, mpc.terminal)

@@ -124,12 +124,12 @@ static void mpc_cost(double weight, const double T[NY][1 + NV], int n, const int
 
 #define J(i, j) jacobian[(i) + (NX + NZ) * (j)] /* of the equations of a point by its signals */
 
-/* A stage that begins at time t linearised at x, w, u, with the estimates that are known; 0 where its equations are singular. See HorizonStages.linear. */
+/* A stage that begins at time t linearised at x, w, u, with the estimates that are known; 0 where its equations are singular or a number is not finite. See HorizonStages.linear. */
 static int mpc_linearise(const double *x, const double *w, const double *u, double t, const double *known,
                          mpc_linear *to) {
     double y[2][NY], e[2][NX + NZ], jacobian[(NX + NZ) * NY], gradient[2][NY], curved[2][ROOM(NC * NC)];
     double rows[ROOM(NL)], slopes[ROOM(NL) * NY], end_g[NY], end_H[ROOM(MPC_END * NY * NY)], z[2][ROOM(NZ)][1 + NV], limits[2][ROOM(NL)][1 + NY];
-    double left[2 * NX][2 * NX], moved[2 * NX][1 + NV], f[2][NX][1 + NV];
+    double left[2 * NX][2 * NX], moved[2 * NX][1 + NV], f[2][NX][1 + NV], all;
     int i, j, k, p, q;
     FOR(p, 2) {
         double at = t + MPC_PERIOD * mpc_nodes[p], A[ROOM(NZ * NZ)];
@@ -193,7 +193,8 @@ static int mpc_linearise(const double *x, const double *w, const double *u, doub
     }
     mpc_convex(to->H);
     if (MPC_END) mpc_cost(1, to->T[1], NY, mpc_every, end_H, end_g, to->end_H, to->end_g);
-    return 1;
+    for (i = 0, all = 0; i < (int)(sizeof *to / sizeof(double)); i++) all += 0 * ((const double *)to)[i];
+    return isfinite(all);
 }
 
 /* ---- The program of the horizon: see horizon_qp.py, and moves.py for what is added to its stages. */
@@ -472,6 +473,7 @@ static int mpc_later(controller_state *it, double *x, double t) {
     mpc_linear linear;
     int i, turn;
     memcpy(w, it->plan.w[0], sizeof w);
+    FOR(i, NX) w[i] = w[NX + NZ + i] = x[i];
     FOR(turn, 12) if (!(change < 1e-10)) {
         if (!mpc_linearise(x, w, it->applied, t, it->known, &linear)) return 0;
         change = 0;
@@ -486,10 +488,11 @@ static int mpc_later(controller_state *it, double *x, double t) {
     return change < 1e-10;
 }
 
-/* One iteration of Gauss and Newton from state x at time t; the largest change of an input, below 0 without solution. */
-static double mpc_iterate(controller_state *it, const double *x, double t) {
+/* One iteration of Gauss and Newton from state x at time t; the largest change of an input, below 0 without solution.
+ * near: only if the plan is nearly a motion of the model; see PlannedMotion.near. */
+static double mpc_iterate(controller_state *it, const double *x, double t, int near) {
     mpc_work *work = &it->work;
-    double first[NQ] = {0}, o[NU], change = 0;
+    double first[NQ] = {0}, o[NU], change = 0, off = 0, size = 0, begin = 0, given = 0, all = 0;
     int i, j, k, m;
     FOR(k, N) {
         FOR(i, NU) o[i] = (k ? it->plan.u[k - 1][i] : it->applied[i]) - it->plan.u[k][i];
@@ -497,6 +500,9 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         FOR(i, NW) FOR(j, 1 + NV) work->unknowns[k][i][j] = work->linear.T[i / (NX + NZ)][i % (NX + NZ)][j];
         mpc_assemble(&work->stages[k], k, &work->linear, it->plan.w[k] + NX + NZ, it->plan.x[k + 1], it->plan.u[k], o);
     }
+    FOR(k, N) FOR(i, NW) off = fmax(off, fabs(work->unknowns[k][i][0])), size = fmax(size, fabs(it->plan.w[k][i]));
+    FOR(i, NX) begin = fmax(begin, fabs(it->plan.x[0][i])), given = fmax(given, fabs(x[i]));
+    if (near && !(off < 1 + size && begin < MPC_APART * (1 + given))) return -1;
     memset(work->end_P, 0, sizeof work->end_P), memset(work->end_p, 0, sizeof work->end_p);
     FOR(i, NX) FOR(j, NX) {
         work->end_P[i][j] = mpc_rest_P[i][j];
@@ -518,7 +524,12 @@ static double mpc_iterate(controller_state *it, const double *x, double t) {
         FOR(i, NU) it->plan.u[k][i] += by[1 + NX + i];
     }
     FOR(i, NX) it->plan.x[N][i] += work->end_v[i];
-    return change;
+    FOR(k, N) {
+        FOR(i, NW) all += 0 * it->plan.w[k][i];
+        FOR(i, NU) all += 0 * it->plan.u[k][i];
+    }
+    FOR(k, N + 1) FOR(i, NX) all += 0 * it->plan.x[k][i];
+    return isfinite(all) ? change : -1;
 }
 
 void controller_init(controller_state *state) {
@@ -532,7 +543,7 @@ void controller_init(controller_state *state) {
 void controller_step(controller_state *state, const controller_real *given, controller_real *found) {
     controller_state *it = state;
     double x[NX], kept[NU], change = 0, t;
-    int i, turn, begun, solved = 1;
+    int i, turn, on, begun, solved = 1;
     if (!it->ready) controller_init(it);
     t = it->steps * MPC_PERIOD, begun = it->begun, it->lost = 0;
     it->steps += 1;
@@ -548,9 +559,12 @@ void controller_step(controller_state *state, const controller_real *given, cont
     if (begun) mpc_shift(it);
     memcpy(kept, it->plan.u[0], sizeof kept);
     it->before = it->plan;
-    if (solved) FOR(turn, begun ? MPC_ITERATIONS : MPC_FIRST) {
-        change = mpc_iterate(it, x, t);
-        if (change < MPC_STANDS) break;
+    if (solved) for (on = begun, change = -1; change < 0 && on >= 0; on--) {
+        if (begun && !on) mpc_guess(it, x); /* the plan before leads nowhere: a first one */
+        FOR(turn, on ? MPC_ITERATIONS : MPC_FIRST) {
+            change = mpc_iterate(it, x, t, on && !turn);
+            if (change < MPC_STANDS) break;
+        }
     }
     solved &= change >= 0;
     if (!solved) it->plan = it->before;

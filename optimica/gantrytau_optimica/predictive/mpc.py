@@ -29,12 +29,13 @@ from gantrytau_optimica.predictive.plan import (
 )
 from gantrytau_optimica.predictive.stages import HorizonStages, Linear
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
-from gantrytau_optimica.predictive.unknowns import as_courses, named_values, with_unknowns
+from gantrytau_optimica.predictive.unknowns import named_values
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
 STANDS = 1e-6  # changes of scaled inputs by which iterations are done; flat parts of a program are not solved better
 PENALTY = 1e3  # times the largest curvature of the objective
+PASSED = 1e-6  # of the size of a limit: less is rounding
 MOST = 50  # iterations of the first plan, and of `converged`
 
 
@@ -92,7 +93,9 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self.stages, self._estimates = _staged(problem, self.period, disturbance, parameters)
+        self.built, self.stages, self._estimates = checks.staged(
+            problem, self.period, disturbance, parameters
+        )
         self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         checks.check_bounded(self.stages)
@@ -105,7 +108,8 @@ class Mpc:
         limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
         soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
         self._penalty = weight
-        self._program = HorizonProgram(self.elements, nx, self.stages.nu, soft, finite, weight)
+        size = self.stages.curvature
+        self._program = HorizonProgram(self.elements, nx, self.stages.nu, soft, finite, weight, size=size)
         self.terminal = Terminal(self.stages)
         self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._guess = guess
@@ -156,7 +160,7 @@ class Mpc:
         What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
         states, and for a first measurement that is not finite.
         """
-        begin = time.perf_counter()
+        begin, t = time.perf_counter(), number(self.name, "t", t, unit="s")
         (x, lost), reached = self._state(measured), True
         if self.delay:
             x, reached = self._later(x, t)
@@ -195,8 +199,7 @@ class Mpc:
             else:
                 plan = self._plan.shifted(t, self.period)
                 linear = self._linear(plan)
-            # how far the unknowns are from solving their equations, beside what they are
-            near = linear is not None and np.abs(linear.w[:, :, 0]).max() < 1.0 + np.abs(plan.w).max()
+            near = linear is not None and plan.near(linear, x)
             if near and (found := self._improved(plan, linear, x, self.iterations))[1]:
                 return found
         return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
@@ -216,7 +219,7 @@ class Mpc:
             if not found.solved:
                 return plan, False, change
             plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
-            self.softened = self._passed(found)
+            self.softened = self._passed(found.slack, plan)
             if change < STANDS:
                 break
         if first:
@@ -290,7 +293,7 @@ class Mpc:
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
         other = (
-            _staged(plant, step)[:2]
+            checks.staged(plant, step)[:2]
             if plant is not None
             else (self.built, HorizonStages(self.built.problem, step))
         )
@@ -300,7 +303,7 @@ class Mpc:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
         It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
-        foretold, or kept, and no plan is made anew.
+        foretold, or kept.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
@@ -345,10 +348,13 @@ class Mpc:
 
     def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
         """The state a period later with the inputs held that are applied now, and whether the motion goes there."""
-        plan = self._first(x, t)
-        for begin in (plan if self._plan is None else self._plan, plan):
+        plan, nx = self._first(x, t), self.stages.nx
+        known = plan if self._plan is None else self._plan
+        still = known.w[0].reshape(2, -1).copy()
+        still[:, :nx] = x
+        for begin in (still.ravel(), known.w[0], plan.w[0]):
             with suppress(ModelError):
-                return self.stages.moved(x, begin.w[0], self._applied, t)[self.stages.last], True
+                return self.stages.moved(x, begin, self._applied, t)[self.stages.last], True
         return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
@@ -368,28 +374,9 @@ class Mpc:
             raise ModelError(words, place=self.name, found=Given("hard", unknown[0]))
         return np.array([name not in hard for name in names], dtype=bool)
 
-    def _passed(self, found: Found) -> tuple[str, ...]:
-        """Words of the soft limits, where the plan passes one."""
-        passed = zip(self.stages.row_names, self._yielding & np.any(found.slack > 1e-6), strict=True)
-        return tuple(dict.fromkeys(name for name, so in passed if so))
-
-
-def _staged(
-    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
-) -> tuple[Any, HorizonStages, dict[str, float]]:
-    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
-    horizon can have.
-    """
-    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
-    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
-    read, found = built.read, built.problem
-    if found.free:
-        names = ", ".join(n.name for n in found.free)
-        raise ModelError(
-            f"{names} is free, expected a number: a receding horizon has a fixed length and a fixed model; give it a value, "
-            "as in final_time = 1.0",
-            place=read.name,
-        )
-    if not any(phase.inputs for phase in found.phases):
-        raise ModelError("there is no input to choose; declare one as Input", place=read.name)
-    return built, HorizonStages(found, period), estimates
+    def _passed(self, slack: np.ndarray, plan: PlannedMotion) -> tuple[str, ...]:
+        """Words of the soft limits that the plan passes; others may only touch, by linearisation beyond them a little."""
+        if not (most := slack.max(initial=0.0)) > PASSED:
+            return ()
+        passed = self.stages.beyond(plan.w, plan.u, plan.t) > max(PASSED, 1e-3 * most)
+        return tuple(limit.name for limit, so in zip(self.stages.path, passed, strict=True) if so)

@@ -17,6 +17,8 @@ from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.predictive.horizon_qp import Found
 from gantrytau_optimica.predictive.stages import NODES, HorizonStages, Linear
 
+APART = 1e3  # times a measured state at which a plan begins that an outlier has spoilt
+
 
 @dataclass(frozen=True)
 class StepTimes(Record):
@@ -62,6 +64,14 @@ class PlannedMotion:
         v = np.concatenate([np.ones((len(self.u), 1)), found.x[:-1], found.u], axis=1)
         w = self.w + np.einsum("nij,nj->ni", linear.w, v)
         return PlannedMotion(self.x + found.x, w, self.u + found.u, self.t)
+
+    def near(self, linear: Linear, x: np.ndarray) -> bool:
+        """Whether it can go on from a state (nx,), linearised: its unknowns nearly solve their equations, beside what they
+        are, and it begins not far beyond the state.
+        """
+        begin, given = (np.abs(one).max(initial=0.0) for one in (self.x[0], x))
+        off = np.abs(linear.w[:, :, 0]).max(initial=0.0)
+        return bool(off < 1.0 + np.abs(self.w).max(initial=0.0) and begin < APART * (1.0 + given))
 
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""

@@ -173,6 +173,14 @@ class HorizonStages:
         n = len(u)
         return np.concatenate([w.reshape(n, 2, -1), np.repeat(u[:, None], 2, axis=1)], axis=2)
 
+    def beyond(self, w: np.ndarray, u: np.ndarray, begin: float) -> np.ndarray:
+        """By how much a motion from some time on passes limits along the path at most, (path,), each by its size."""
+        t = begin + self.step * (np.arange(len(u))[:, None] + NODES).ravel()
+        y = self.points(w, u).reshape(2 * len(u), -1)
+        rows = self._at_points(y, t, self.course_values(t).T)[4].reshape(len(u), -1)
+        lower, upper = self.rows
+        return np.maximum(lower - rows, rows - upper).reshape(2 * len(u), -1).max(axis=0)
+
     def linear(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear:
         """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s."""
         n, nx, nz, nu = len(u), self.nx, self.nz, self.nu
