@@ -73,9 +73,10 @@ def controller_code(
     flat = mpc.built.read.dae.flat
     own = {*mpc.states, *mpc.inputs}
     units = {n: v.unit for v in flat.variables for n in v.elements if v.unit and n in own}
+    starts = {s.name: float(s.guess(np.zeros(1))[0]) for s in stages.phase.states} | dict(estimates)
     return SampledCode(
-        name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, header=header,
-        source=source,
+        name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, starts=starts,
+        header=header, source=source,
     )  # fmt: skip
 
 

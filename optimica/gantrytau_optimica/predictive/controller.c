@@ -388,14 +388,16 @@ static int mpc_factored(mpc_work *work, double ridge) {
 
 /* Solve the program of the stages from a first change of the state; 1 if it is solved. */
 static int mpc_program(mpc_work *work, const double *first) {
-    double largest = 1e-300, left = 1, mean = 1, missed = 0, step;
+    double largest = 1e-300, slope = 0, ridge = MPC_RIDGE, left = 1, mean = 1, missed = 0, step;
     int i, j, k, n, turn;
     FOR(n, N) FOR(i, NE) FOR(j, NE) largest = fmax(largest, fabs(work->stages[n].H[i][j]));
     FOR(i, NQ) FOR(j, NQ) largest = fmax(largest, fabs(work->end_P[i][j]));
+    FOR(n, N) FOR(i, NE) slope = fmax(slope, fabs(work->stages[n].g[i]));
+    if (largest < 1e-6 * slope) ridge *= largest / slope, largest = slope; /* as good as linear */
     FOR(i, NQ) {
         work->end_p[i] /= largest;
         FOR(j, NQ) work->end_P[i][j] /= largest;
-        work->end_P[i][i] += MPC_RIDGE;
+        work->end_P[i][i] += ridge;
     }
     FOR(n, N) {
         mpc_stage *s = &work->stages[n];
@@ -406,7 +408,7 @@ static int mpc_program(mpc_work *work, const double *first) {
         s->penalty = MPC_PENALTY / largest;
         FOR(k, NI) s->s[k] = s->lambda[k] = 1, s->aim[k] = 0;
     }
-    if (!mpc_factored(work, MPC_RIDGE)) return 0;
+    if (!mpc_factored(work, ridge)) return 0;
     mpc_direction(work, first);
     FOR(n, N) FOR(k, NI) {
         mpc_stage *s = &work->stages[n];
@@ -416,7 +418,7 @@ static int mpc_program(mpc_work *work, const double *first) {
     memcpy(work->end_v, work->end_to, sizeof work->end_v);
     FOR(turn, MPC_TURNS) {
         double reached, share;
-        if (NI && !mpc_factored(work, MPC_RIDGE)) break;
+        if (NI && !mpc_factored(work, ridge)) break;
         FOR(n, N) FOR(k, NI) work->stages[n].aim[k] = 0;
         mpc_direction(work, first);
         step = mpc_longest(work), mean = mpc_mean(work, 0), reached = mpc_mean(work, step);
