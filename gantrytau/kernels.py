@@ -24,6 +24,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -112,10 +113,12 @@ class Kernel:
             if command is None or folder is None:
                 self._next = math.inf
                 return None
-            self._key, self._folder, self._command = _key(self.function, command), folder, command
+            self._key, self._folder, self._command = _key(self.function.serialize(), command), folder, command
         found = _kept(self._folder, self._key, self.function)
         if found is None and begin:
-            process = _begun(self._folder, self._key, self.function, self._command, self._priority)
+            process = _begun(
+                self._folder, self._key, lambda: _written(self.function), self._command, self._priority
+            )
             if process is not None and wait:
                 process.wait()
                 found = _kept(self._folder, self._key, self.function)
@@ -145,6 +148,22 @@ def kernel_for(function: ca.Function, calls: float, wait: bool = False) -> Kerne
 def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Function:
     """The function compiled, where that pays, or the function itself; arguments of `kernel_for`."""
     return kernel_for(function, calls, wait).function
+
+
+def library(source: str) -> Path | None:
+    """A shared library of C, which is compiled now unless it is in the cache; None where it cannot be."""
+    command, folder = _command("-O3"), kernel_folder()
+    if command is None or folder is None:
+        return None
+    key = _key(source, command)
+    with suppress(OSError):  # no room or permission
+        if (found := _intact(folder, key)) is None and (
+            process := _begun(folder, key, lambda: source, command, 0)
+        ):
+            process.wait()
+            found = _intact(folder, key)
+        return found
+    return None
 
 
 def c_compiler() -> list[str] | None:
@@ -183,7 +202,7 @@ def _command(level: str) -> list[str] | None:
     return [found, *command[1:], level, *FLAGS] if command and found else None
 
 
-def _key(function: ca.Function, command: list[str]) -> str:
+def _key(content: str, command: list[str]) -> str:
     """A hash of all that makes a kernel what it is."""
     import casadi as ca
 
@@ -197,7 +216,7 @@ def _key(function: ca.Function, command: list[str]) -> str:
         about.st_size,
         about.st_mtime_ns,
     ]
-    text = "\n".join([*map(str, parts), *command, function.serialize()])
+    text = "\n".join([*map(str, parts), *command, content])
     return hashlib.sha256(text.encode()).hexdigest()[:LETTERS]
 
 
@@ -205,30 +224,47 @@ def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:LETTERS]
 
 
-def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
-    """The kernel of a key; what is damaged is deleted, and what this machine cannot load is not made again for a while."""
-    import casadi as ca
-
+def _intact(folder: Path, key: str) -> Path | None:
+    """What was compiled for a key; what is damaged is deleted."""
     for path in folder.glob(f"{key}-*"):
         if _digest(path) == path.stem.partition("-")[2]:
-            try:
-                found = ca.external(function.name(), str(path))
-                with suppress(OSError):  # a cache that cannot be written
-                    os.utime(path)
-                return found
-            except RuntimeError:
-                with suppress(FileExistsError):
-                    (folder / f"{key}.failed").mkdir()
+            return path
         path.unlink(missing_ok=True)
     return None
 
 
-def _begun(
-    folder: Path, key: str, function: ca.Function, command: list[str], priority: int
-) -> subprocess.Popen[bytes] | None:
-    """The process that compiles a kernel; None where another one does, or too many are at work."""
+def _kept(folder: Path, key: str, function: ca.Function) -> ca.Function | None:
+    """The kernel of a key; what this machine cannot load is deleted, and not made again for a while."""
     import casadi as ca
 
+    path = _intact(folder, key)
+    if path is None:
+        return None
+    try:
+        found = ca.external(function.name(), str(path))
+    except RuntimeError:
+        with suppress(FileExistsError):
+            (folder / f"{key}.failed").mkdir()
+        path.unlink(missing_ok=True)
+        return None
+    with suppress(OSError):  # a cache that cannot be written
+        os.utime(path)
+    return found
+
+
+def _written(function: ca.Function) -> str:
+    """A function as C; RuntimeError for one that CasADi cannot write."""
+    import casadi as ca
+
+    generator = ca.CodeGenerator("kernel.c")
+    generator.add(function)
+    return generator.dump()
+
+
+def _begun(
+    folder: Path, key: str, source: Callable[[], str], command: list[str], priority: int
+) -> subprocess.Popen[bytes] | None:
+    """The process that compiles a kernel; None where another one does, or too many are at work."""
     now = time.time()
     works, failed = list(folder.glob("*.work")), folder / f"{key}.failed"
     for other in (*works, failed):
@@ -243,9 +279,7 @@ def _begun(
     except FileExistsError:
         return None
     try:
-        generator = ca.CodeGenerator("kernel.c")
-        generator.add(function)
-        (work / "kernel.c").write_text(generator.dump())  # OSError on a full disk, where CasADi says nothing
+        (work / "kernel.c").write_text(source())  # OSError on a full disk, where CasADi says nothing
     except (OSError, RuntimeError):
         _give_up(work)
         raise

@@ -81,7 +81,7 @@ print(rig, square, RECORD.fitted, sep="\n")
 by_actuators = learn(rig, square, Learning(window=window), Actuators(), iterations=RUNS, seed=1)
 print(by_actuators)
 assert np.all(by_actuators.relative[5] < 4)
-assert by_actuators.tool_relative[5, 1] > 30
+assert np.all(np.abs(by_actuators.tool_relative[5:, :2].mean(axis=0) / [13.3, 36.1] - 1) < 0.1)
 by_actuators.plot("errors")
 
 # %%
@@ -168,7 +168,10 @@ print(f"{'case':20s} sigma   x     y     (printed: 13.3 36.1, 12.6 23.9, 13.3 25
 for name, history in histories.items():
     tool = history.tool_relative[5:].mean(axis=0)
     print(f"{name:20s} {history.stability.sigma:.3f} {tool[0]:5.1f} {tool[1]:5.1f}")
-    assert name.startswith("1") or tool[1] < by_actuators.tool_relative[5:, 1].mean() - 8
+    assert name.startswith("1") or (
+        tool[1] < by_actuators.tool_relative[5:, 1].mean() - 8 and 0.84 < history.stability.sigma < 0.96
+    )
+assert np.all(np.abs(histories["3, gauges"].tool_relative[5:, :2].mean(axis=0) / [10.3, 24.9] - 1) < 1 / 3)
 plot_learning(histories)
 
 # %% [markdown]
@@ -190,7 +193,8 @@ for title, filters in (("estimate", design_q(seen)), ("estimate and tool", suits
 learning = Learning(q=suits, window=window)
 careful = learn(rig, square, learning, kalman, iterations=RUNS, seed=1, response=seen)
 print(careful.tool_relative[5:].mean(axis=0).round(1)[:2], "% of x and y, printed 13.3 and 25.2")
-assert np.all(careful.tool_relative[5:, :2].mean(axis=0) > [9, 17])  # %; by the estimate alone 5 along x
+# by the estimate alone 5 % along x
+assert np.all(np.abs(careful.tool_relative[5:, :2].mean(axis=0) / [13.3, 25.2] - 1) < 1 / 3)
 
 # %% [markdown]
 # Now cases 2A, 2B and 3 are all within a third of the printed errors. What the thesis reached, a robot that is not known

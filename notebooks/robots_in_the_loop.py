@@ -21,9 +21,9 @@
 import casadi as ca
 import numpy as np
 
-from gantrytau import Input, Model, Parameter, Real, animate, between, cos, der, sin, tanh, time
+from gantrytau import Bounds, Input, Model, Parameter, Real, animate, between, cos, der, sin, tanh, time
 from gantrytau_models import DeltaRobot, FourBar, GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
-from gantrytau_optimica import Mpc, Optimization, Path, initial, optimize
+from gantrytau_optimica import Mpc, Optimization, Path, Way, initial, optimize
 
 # %% [markdown]
 # ## A pole swings up and is held
@@ -168,8 +168,8 @@ even.plot("linkage.bars.crank.w", "linkage.bars.rocker.phi", "linkage.motor")
 # %% [markdown]
 # ## A Gantry-Tau along a path, its forces limited
 #
-# The way along the path is a state of its own, which the controller pushes: as fast as 0.5 m/s where the carts allow
-# it.
+# The controller chooses its own progress along the way, a state of which it may push the acceleration: as fast as 0.5 m/s
+# where the carts allow it. It pays for errors across the path and along it, and is paid for speed.
 
 
 # %%
@@ -181,15 +181,12 @@ class AlongPath(Optimization):
     """Follow the path within a millimetre, at 0.5 m/s if it may be."""
 
     robot = GantryTau(prototypes.L1)
-    way = Real(start=0.0, unit="m", min=0.0, max=PATH.length)
-    pace = Input(min=0.0, max=0.5, unit="m/s")
-
-    def equations(self):
-        yield der(self.way) == self.pace
+    way = Way(PATH, s=dict(start=0.0), v=Bounds(0.0, 0.5))
+    given = ("way.a", "robot.carts[0].f", "robot.carts[1].f", "robot.carts[2].f")
 
     def integrand(self):
-        off = ca.sumsqr(self.robot.tool.r - PATH(self.way))
-        return 1e5 * off + ca.sumsqr(self.robot.tool.v) + 10 * (PATH.length - self.way) ** 2
+        contour, lag = self.way.errors(self.robot.tool.r)
+        return 1e5 * (ca.sumsqr(contour) + lag**2) - 5 * self.way.v + 1e-3 * self.way.a**2
 
     def constraints(self):
         for cart in self.robot.carts:
@@ -198,11 +195,11 @@ class AlongPath(Optimization):
 
 path = Mpc(AlongPath, period=0.02, elements=20).run(stop=1.6)
 print(path)
-off = np.linalg.norm(path["robot.tool.r"] - PATH.at(path["way"]), axis=1)
-print(f"off the path by {1e3 * off.max():.2f} mm, {path['way'][-1]:.3f} of {PATH.length:.3f} m")
+off = np.linalg.norm(path["robot.tool.r"] - PATH.at(path["way.s"]), axis=1)
+print(f"off the path by {1e3 * off.max():.2f} mm, {path['way.s'][-1]:.3f} of {PATH.length:.3f} m")
 assert off.max() < 1e-3
 assert max(abs(path[f"robot.carts[{k}].f"]).max() for k in range(3)) <= 600.0 + 1e-3
-path.plot("way", "pace", "robot.carts[0].f", "robot.carts[1].f", "robot.carts[2].f")
+path.plot("way.s", "way.v", "robot.carts[0].f", "robot.carts[1].f", "robot.carts[2].f")
 
 # %% [markdown]
 # ## Six links

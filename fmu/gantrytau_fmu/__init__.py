@@ -4,9 +4,9 @@ from gantrytau_fmu.building.archive import check_target
 from gantrytau_fmu.controller.channels import Channel
 from gantrytau_fmu.description import DefaultExperiment
 from gantrytau_fmu.export import SOLVERS, Build, export_code, export_fmu
-from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import no_file
+from gantrytau_fmu.systems.checking.check_fmu import check_fmu
 from gantrytau_fmu.systems.connected_system import UnconnectedInputs
 from gantrytau_fmu.systems.cosimulate import cosimulate
 from gantrytau_fmu.systems.master import ORDERS, Master

@@ -12,10 +12,11 @@ from typing import Literal
 
 import casadi as ca
 
-from gantrytau import Dae, Input, Model, Real, sampled, translate
+from gantrytau import Dae, Input, Model, Real, sampled, simulate, translate
 from gantrytau.answers.sampled_code import SampledCode
 from gantrytau.border.checks import check_words, instance, number, one_of
 from gantrytau.border.refusal import Given, ModelError
+from gantrytau.results.result import Result
 from gantrytau_fmu.building.archive import binary_members, check_target, write_archive
 from gantrytau_fmu.building.compile_libraries import NoCompiler, compile_libraries
 from gantrytau_fmu.building.platforms import Platform, chosen
@@ -28,6 +29,7 @@ from gantrytau_fmu.describing.description_checks import STRUCTURED
 from gantrytau_fmu.describing.documentation import documentation, licenses
 from gantrytau_fmu.describing.fmi2_description import in_fmi_2
 from gantrytau_fmu.describing.model_description import COMPILED, build_description, model_description
+from gantrytau_fmu.describing.reference_files import reference_members
 from gantrytau_fmu.describing.terminals import icon, icon_svg, terminals_and_icons
 from gantrytau_fmu.description import AboutFmu, DefaultExperiment, FmuDescription, FmuInterface, Interfaces
 
@@ -72,6 +74,7 @@ def export_fmu(
     find: Sequence[str] = (),
     states: Sequence[str] | None = None,
     build: Build | None = None,
+    reference: Result | float | bool | None = None,
 ) -> Path:
     """Write a model as FMU and return its path.
 
@@ -83,6 +86,9 @@ def export_fmu(
     Without a compiler a source FMU is written, with a warning. An existing file is replaced when the new one is
     complete. Raises ModelError for wrong arguments, unwritable paths and failed compilations, and what `translate`
     raises. FMI 2.0.4 and 3.0.2.
+    reference: reference results to put into the file, by which `check_fmu(..., run=True)` judges it anywhere: a `Result` of
+    the model from 0 s on, the time in s until which it is simulated, or True until the end of the experiment, of `build`,
+    else the model's, else 1 s. Unless sources are left out, the equations of the DAE are put beside them.
     """
     check_words(export_fmu, {"fmi": fmi, "solver": solver})
     tolerance = number("export_fmu", "tolerance", tolerance, least=1e-12, below=1.0)
@@ -91,8 +97,14 @@ def export_fmu(
     check_target(path)
     dae = _translated(model, given, find, states)
     about = replace(about, description=about.description or _description(model, dae))
-    about = replace(about, experiment=about.experiment or DefaultExperiment(tolerance=tolerance))
-    return _exported(with_ends_of_tables(dae), find, path, _Request(fmi, kinds, solver, tolerance, about))
+    result = _reference(dae, reference, about, tolerance)
+    usual = DefaultExperiment(tolerance=tolerance)
+    if result is not None:
+        stop = float(result.time[-1])
+        usual = replace(usual, stop=stop, step=min(usual.step or stop, stop))
+    about = replace(about, experiment=about.experiment or usual)
+    request = _Request(fmi, kinds, solver, tolerance, about, reference=result, own=dae)
+    return _exported(with_ends_of_tables(dae), find, path, request)
 
 
 def export_code(
@@ -123,7 +135,7 @@ def export_code(
 
 @dataclass(frozen=True)
 class _Request:
-    """How an FMU is written; code: C that takes its samples, else its formulas do."""
+    """How an FMU is written; code: C that takes its samples, else its formulas do; own: the model as it was given."""
 
     fmi: Literal["3.0", "2.0"]
     kinds: tuple[Interfaces, ...]
@@ -131,6 +143,8 @@ class _Request:
     tolerance: float
     about: Build
     code: SampledCode | None = None
+    reference: Result | None = None
+    own: Dae | None = None
 
 
 def _exported(dae: Dae, find: Sequence[str], path: str | Path, request: _Request) -> Path:
@@ -154,7 +168,24 @@ def _exported(dae: Dae, find: Sequence[str], path: str | Path, request: _Request
     fmu = replace(fmu if fmi == "3.0" else in_fmi_2(fmu), platforms=tuple(sorted(p.name for p in binaries)))
     if about.sources or not binaries:
         fmu = replace(fmu, sources=(f"sources/{COMPILED}",))
-    return write_archive(path, _members(fmu, solver, texts, binaries))
+    members = _members(fmu, solver, texts, binaries)
+    if request.reference is not None and request.own is not None:
+        equations = request.own.equations("base-modelica") if about.sources else ""
+        members |= reference_members(fmu, request.reference, equations)
+    return write_archive(path, members)
+
+
+def _reference(
+    dae: Dae, reference: Result | float | bool | None, about: Build, tolerance: float
+) -> Result | None:
+    """The reference results, simulated unless they are given."""
+    if reference is None or reference is False or isinstance(reference, Result):
+        return reference or None
+    if reference is True:
+        said = about.experiment.stop if about.experiment else dae.flat.experiment.get("StopTime")
+        reference = said or DefaultExperiment().stop
+    stop = number("export_fmu", "reference", reference, above=0.0, unit="s")
+    return simulate(dae, stop=stop, tolerance=min(1e-8, tolerance))
 
 
 def _interfaces(interfaces: Sequence[Interfaces] | Interfaces) -> tuple[Interfaces, ...]:

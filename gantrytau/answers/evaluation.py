@@ -126,15 +126,14 @@ def given_scalars(dae: Translated, given: Mapping[str, Any]) -> dict[str, float]
 
 def named_values(dae: Translated, values: Mapping[str, float]) -> dict[str, Any]:
     """Every variable, parameter and derivative by name, scalars as float and vectors as arrays."""
-    chains = dae.indexed.orders
     names: list[str] = []
     groups: list[tuple[str, tuple[int, ...], list[str]]] = []
     for quantity in dae.flat.propagated:
         groups.append((quantity.name, quantity.shape, list(quantity.elements)))
     for variable in dae.flat.variables:
-        for order in range(max(chains.values(), default=0) + 1):
+        for order in range(max(dae.indexed.orders.values(), default=0) + 1):
             elements = [derivative_name(n, order) for n in variable.elements]
-            if all(_available(dae, n, order, chains, values) for n in variable.elements):
+            if all(_available(dae, n, order, values) for n in variable.elements):
                 groups.append((derivative_name(variable.name, order), variable.shape, elements))
                 names += elements
     names += dae.flat.definitions
@@ -150,8 +149,6 @@ def named_values(dae: Translated, values: Mapping[str, float]) -> dict[str, Any]
     return numbers
 
 
-def _available(
-    dae: Translated, name: str, order: int, chains: Mapping[str, int], values: Mapping[str, float]
-) -> bool:
+def _available(dae: Translated, name: str, order: int, values: Mapping[str, float]) -> bool:
     alias = dae.reduced.aliases[name].shifted(order)
     return alias.root is None or alias.symbol in values

@@ -50,9 +50,20 @@ class Columns:
 
         Raises ModelError, with the line, for what cannot be read as text, and rows that are not as long as the header.
         """
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise ModelError(
+                f"{path}: found no file to read ({error.strerror}), expected a CSV file"
+            ) from None
+        return cls.parse(content, path, rows)
+
+    @classmethod
+    def parse(cls, content: bytes, path: str | PathLike[str], rows: str = "one line for each row") -> Self:
+        """The table of a file that has been read, for one inside of an archive; as `read`."""
         path = Path(path)
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
             names, end, separator = _head(text)
             header = tuple(cell.strip() for _, row in _rows([names], separator) for cell in row)
             text = text.replace(text[:end], "\n" * text.count("\n", 0, end), 1)
@@ -62,10 +73,6 @@ class Columns:
                 for line, row in found:
                     _check_length(path, line, row, len(header), separator)
                 lines = np.array([line for line, _ in found], dtype=int)
-        except OSError as error:
-            raise ModelError(
-                f"{path}: found no file to read ({error.strerror}), expected a CSV file"
-            ) from None
         except (UnicodeDecodeError, csv.Error) as error:
             raise ModelError(
                 f"{path}: cannot be read as text ({error}); save it as CSV with the encoding UTF-8"

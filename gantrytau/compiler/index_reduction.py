@@ -15,7 +15,7 @@ import numpy as np
 from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.dulmage_mendelsohn import largest_sum, signature
 from gantrytau.compiler.refusals import unbalanced
-from gantrytau.compiler.start.level import Level
+from gantrytau.compiler.start.level import Level, joined
 from gantrytau.compiler.symbol_spaces import column
 from gantrytau.flattening.flat_model import FlatModel
 from gantrytau.language.declarations import StateSelect
@@ -74,12 +74,7 @@ class Indexed:
     @cached_property
     def whole(self) -> Level:
         """All levels as one."""
-        return Level(
-            tuple(r for level in self.levels for r in level.residuals),
-            tuple(n for level in self.levels for n in level.names),
-            tuple(n for level in self.levels for n in level.unknowns),
-            self.exact,
-        )
+        return joined(self.levels)
 
     @cached_property
     def with_initial(self) -> dict[tuple[str, ...], Level]:

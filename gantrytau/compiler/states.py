@@ -31,10 +31,9 @@ LAST = StateSelect.ALWAYS + 1  # the weight of what the caller asks for
 
 @dataclass(frozen=True)
 class StateChoice:
-    """states: names, in order; dummies: derivatives that became plain unknowns; condition: of the choice."""
+    """states: names, in order; condition: of the choice."""
 
     states: tuple[str, ...]
-    dummies: tuple[str, ...]
     condition: float
 
 
@@ -57,7 +56,8 @@ def choose_states(
     for level in range(1, max(indexed.counts, default=0) + 1):
         rows = [i for i, count in enumerate(indexed.counts) if count >= level]
         columns = [n for n in allowed if indexed.orders[n] >= level]
-        chosen, conditioned = _basis(indexed, reduced, sample, preference, wanted, rows, columns, title)
+        matrix = _constraints(indexed, reduced, sample, rows, columns, allowed)
+        chosen, conditioned = _basis(reduced, matrix, preference, wanted, rows, columns, title)
         condition = max(condition, conditioned)
         dummies |= {derivative_name(n, indexed.orders[n] - level) for n in chosen}
         allowed = chosen
@@ -74,14 +74,11 @@ def choose_states(
             f"{', '.join(states)} ({len(states)} in all). Name other variables in "
         )
         raise StructureError(words, Given("states"), ", or fewer", place=title, argument="states")
-    return StateChoice(states, tuple(sorted(dummies)), condition)
+    return StateChoice(states, condition)
 
 
-def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -> tuple[list[str], float]:
+def _basis(reduced, matrix, preference, wanted, rows, columns, title) -> tuple[list[str], float]:
     """Which variables become dependent: as many as there are rows, the least preferred first."""
-    x = ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in columns))
-    f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
-    matrix = values_at(ca.jacobian(f, x), sample)
     sizes_of_rows, sizes_of_columns = balance(matrix)
     matrix = sizes_of_rows * matrix * sizes_of_columns
     matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
@@ -112,6 +109,27 @@ def _basis(indexed, reduced, sample, preference, wanted, rows, columns, title) -
         chosen = _exchanged(matrix, chosen, weights)
         condition = _condition(matrix[:, chosen])
     return [columns[j] for j in sorted(chosen)], condition
+
+
+def _constraints(indexed, reduced, sample, rows, columns, allowed) -> np.ndarray:
+    """The derivatives of constraints by coordinates.
+
+    A function may give its derivative by another variable, as a rotation matrix by the angular velocity: what that is of
+    the coordinates, the equations say that are differentiated less often.
+    """
+
+    def highest(names: Sequence[str]) -> ca.SX:
+        return ca.vertcat(*(reduced.chains.sx(n, indexed.orders[n]) for n in names))
+
+    x, y = highest(columns), highest([n for n in allowed if n not in set(columns)])
+    f = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in rows))
+    matrix = values_at(ca.jacobian(f, x), sample)
+    if y.is_empty() or not ca.depends_on(f, y):
+        return matrix
+    others = [i for i, count in enumerate(indexed.counts) if count and i not in set(rows)]
+    g = ca.vertcat(*(indexed.residuals[i, indexed.counts[i]] for i in others))
+    by_x, by_y = (values_at(ca.jacobian(g, one), sample) for one in (x, y))
+    return matrix - values_at(ca.jacobian(f, y), sample) @ np.linalg.lstsq(by_y, by_x)[0]
 
 
 def _project(rest: np.ndarray, sizes: np.ndarray, column: int) -> None:

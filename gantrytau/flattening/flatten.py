@@ -132,7 +132,8 @@ def write_out(instance: Instance) -> FlatModel:
         equations = [one for one in equations if id(one) not in used]
         equations += [*_of_the_ways(stated.ways, tree), *_bindings(instance)]
         joined = [c for c in connections if id(c[1]) not in tree.repeated]
-        closures = [Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing)]
+        cut = (Closure(instance, k, c, loop) for k, (c, loop) in enumerate(tree.closing))
+        closures = [closure for closure in cut if closure.equations]
         equations += connection_equations(instance, joined, closures)
         equations += [e for closure in closures for e in closure.equations]
         spread = Spread(instance, tree, passed_on)

@@ -8,6 +8,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.flattening.flat_model import FlatVariable, Loop
 from gantrytau.flattening.instantiation import Instance
 from gantrytau.flattening.propagation import propagated
+from gantrytau.language.model import Connector
 from gantrytau.language.statements import Connection, Equation
 from gantrytau.language.symbols import element_names, scalars
 
@@ -18,7 +19,7 @@ class Closure:
     """The equations and multipliers of one closing connection.
 
     The multipliers are the flows that pass from the first connector to the second; those of residuals
-    that repeat others can be zero.
+    that repeat others can be zero. Without residuals it is a connection as any other.
     """
 
     def __init__(self, instance: Instance, number: int, stated: tuple[str, Connection], loop: Loop):
@@ -31,7 +32,7 @@ class Closure:
             name = f"loops[{number}].{flow}"
             self._add(instance, name, (loop.a, loop.b, words), scalars(residual), scalars(rate))
             self._flows[flow] = scalars(basis @ self.variables[-1].symbol)
-        if not self.equations:
+        if not self.equations and type(a).closing is Connector.closing:
             raise ModelError(
                 f"connect({loop.a}, {loop.b}) closes a loop of {', '.join(propagated(a))}, and "
                 f"{type(a).__name__} does not say what that means; give it a method `closing`"

@@ -202,7 +202,7 @@ def defining(instance: Instance, tree: Tree, equations: Sequence[Equation]) -> D
     }
     those = _Defining(instance, equations, {name for each in names.values() for _, name in each})
     for path, edge, root in tree.reached:
-        given = _given(path, tree.nodes[path], edge, root, instance, tree)
+        given = _given(path, tree.nodes[path], edge, root, tree)
         for whole, name in names[path]:
             if whole not in given:
                 those.define(name, needed=True)
@@ -275,7 +275,7 @@ def propagate(
 
     for path, edge, root in tree.reached:
         connector = tree.nodes[path]
-        given = _given(path, connector, edge, root, instance, tree)
+        given = _given(path, connector, edge, root, tree)
         for name, declaration in propagated(connector).items():
             symbols = scalars(symbol_of(connector, name))
             own = [stated[s.name()][1] for s in symbols if s.name() in stated]
@@ -310,7 +310,7 @@ def _without(plain: Mapping[str, ca.SX], elements: list[ca.SX]) -> list[ca.SX]:
     return ca.substitute(value, ca.vertcat(*leaves), known).elements() if leaves else elements
 
 
-def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, instance: Instance, tree: Tree):
+def _given(path: str, connector: Any, edge: _Edge | None, root: Root | None, tree: Tree):
     """The propagated quantities of a connector in terms of the one it is reached from."""
     if root is not None or edge is None:
         return {} if root is None else root.values

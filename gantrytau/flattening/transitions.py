@@ -19,7 +19,7 @@ from gantrytau.flattening.instantiation import Instance, Leaf, Placed
 from gantrytau.flattening.whens import condition_of
 from gantrytau.language.declarations import Discrete, Quantity, Real
 from gantrytau.language.events import CurrentMode, Happening, Mode, Sampling, Transition, WhenChain
-from gantrytau.language.functions import if_else, logic_and
+from gantrytau.language.functions import if_else, logic_and, logic_not
 from gantrytau.language.statements import place_of
 from gantrytau.language.symbols import element_names
 
@@ -57,9 +57,10 @@ def read_transitions(
     ModelError for modes that do not exist or that nothing reaches, guards that are none, and priorities that are none.
     """
     modes = {p.name: p for p in instance.quantities if isinstance(p.declaration, Mode)}
+    inside = {name: _inside(placed, modes) for name, placed in modes.items()}
     arrows: dict[str, list[_Arrow]] = {name: [] for name in modes}
     for path, model, number, said in stated:
-        found = _read(said, (path, model, number), modes, instance)
+        found = _read(said, (path, model, number), modes, inside, instance)
         arrows[said.mode.path].append(found)
     samplings: list[tuple[str, str, int, Sampling]] = []
     chains: list[tuple[str, str, int, WhenChain]] = []
@@ -67,11 +68,35 @@ def read_transitions(
         mine = arrows[name]
         _refuse_unreached(placed, mine)
         mine, seen = _sampled(placed, mine, instance, samplings)
-        chains.append((*mine[0].where, WhenChain(tuple(_branches(placed, mine, seen)))))
+        chains.append((*mine[0].where, WhenChain(tuple(_branches(placed, mine, seen, inside[name])))))
     return samplings, chains, {name: placed.declaration.names for name, placed in modes.items()}
 
 
-def _read(said: Transition, where: Where, modes: dict[str, Placed], instance: Instance) -> _Arrow:
+def _inside(placed: Placed, modes: dict[str, Placed]) -> Any:
+    """The condition that a mode is within the mode of another one that it names, None for one that is within none."""
+    one, above = placed, []
+    while (told := one.declaration.within) is not None:
+        outer = told.rpartition(".")[0]
+        full = f"{placed.path}.{outer}" if placed.path else outer
+        if full not in modes or full in [placed.name, *above]:
+            free = [p for n, p in modes.items() if p.path == placed.path and n not in (placed.name, *above)]
+            beside = [f", as '{p.name.rpartition('.')[2]}.{p.declaration.names[0]}'" for p in free]
+            raise ModelError(
+                f"{one.name}: found within={told!r}, expected a mode of another one beside it that is not within this "
+                f"one{beside[0] if beside else '; declare one'}"
+            )
+        one = modes[full]
+        above.append(full)
+    if not above:
+        return None
+    outer = modes[above[0]]
+    current = CurrentMode(outer.symbol, outer.declaration.names, outer.name)
+    return current.is_in(placed.declaration.within.rpartition(".")[2])
+
+
+def _read(
+    said: Transition, where: Where, modes: dict[str, Placed], inside: dict[str, Any], instance: Instance
+) -> _Arrow:
     place = place_of(*where)
     if not isinstance(said.mode, CurrentMode) or said.mode.path not in modes:
         raise ModelError(
@@ -90,6 +115,8 @@ def _read(said: Transition, where: Where, modes: dict[str, Placed], instance: In
             f"happens within one is when(logic_and(self.mode.is_in('{said.source}'), ...), ...)"
         )
     guard = condition_of(said.guard, instance.symbols, (), place)
+    if inside[said.mode.path] is not None:
+        guard = logic_and(inside[said.mode.path], guard)
     return _Arrow(said, where, guard, guard)
 
 
@@ -159,8 +186,22 @@ def _added(placed: Placed, name: str, declaration: Quantity, instance: Instance)
     return symbol
 
 
-def _branches(placed: Placed, arrows: Sequence[_Arrow], seen: Sequence[Any]) -> Iterator[Happening]:
-    """The branches of the chain of a mode: for each source those that fail, then those that act, by priority."""
+def _branches(
+    placed: Placed, arrows: Sequence[_Arrow], seen: Sequence[Any], inside: Any
+) -> Iterator[Happening]:
+    """The branches of the chain of a mode: for each source those that fail, then those that act, by priority.
+
+    Outside of what it is within a mode goes back to its start; what acts inside lets changes of the outer one go first.
+    """
+    waits = inside is not None
+    if waits and not placed.declaration.history:
+        current, begin = arrows[0].said.mode, placed.attributes["start"].value
+        others = current.is_in(*(n for k, n in enumerate(current.names) if k != begin))
+        words = f"return of {placed.name} to {current.names[begin]}"
+        back = (current.number == begin, *seen)
+        yield Happening(
+            logic_and(logic_not(inside), others), back, words, initially=True, where=arrows[0].where
+        )
     for source in placed.declaration.names:
         out = [a for a in arrows if a.said.source == source]
         for one, other in combinations(out, 2):
@@ -173,10 +214,12 @@ def _branches(placed: Placed, arrows: Sequence[_Arrow], seen: Sequence[Any]) -> 
                     "guards that exclude each other"
                 )
                 words = f"transitions of {placed.name} out of {source}"
-                yield Happening(both, (), words, initially=True, failure=failure, where=one.where)
+                yield Happening(
+                    both, (), words, initially=True, failure=failure, where=one.where, waits=waits
+                )
         for arrow in sorted(out, key=lambda a: np.inf if a.said.priority is None else a.said.priority):
             said = arrow.said
             condition = logic_and(said.mode.is_in(source), arrow.opens)
             to = said.mode.number == said.mode.names.index(said.target)
             actions = (to, *seen, *said.actions)
-            yield Happening(condition, actions, arrow.words, initially=True, where=arrow.where)
+            yield Happening(condition, actions, arrow.words, initially=True, where=arrow.where, waits=waits)

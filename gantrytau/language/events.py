@@ -166,9 +166,20 @@ class Mode(Discrete):
     It begins in the first, or in `start`, and only `transition` changes it. In equations `self.mode.is_in("contact")` is a
     condition and `self.mode.choose(free=..., contact=..., released=...)` a value for each. Results, FMUs and files have the
     number of the mode, from 0 in the order of the names, which stand in its description.
+
+    within: a mode of another one beside it, as "phase.moving", inside of which alone it changes: a state chart in a state.
+    Outside it rests in its start, in which it is entered anew, or with history=True where it was left. Several modes within
+    the same one go on in parallel. Where both may change at once the outer one does.
     """
 
-    def __init__(self, *names: str, start: str | None = None, description: str = ""):
+    def __init__(
+        self,
+        *names: str,
+        start: str | None = None,
+        within: str | None = None,
+        history: bool = False,
+        description: str = "",
+    ):
         wrong = next((n for n in names if not isinstance(n, str) or not n.isidentifier()), None)
         if wrong is not None or len(names) < 2 or len(set(names)) < len(names):
             raise ModelError(
@@ -176,12 +187,18 @@ class Mode(Discrete):
             )
         numbers = ", ".join(f"{k} {name}" for k, name in enumerate(names))
         super().__init__(0, unit="1", description=f"{description or 'mode'}: {numbers}")
+        if not isinstance(within, str | None) or (history and within is None):
+            raise ModelError(
+                f"Mode: found within={within!r}, expected a mode of another one, as 'phase.moving'"
+            )
         self.names = names
+        self.within, self.history = within, history
         self.start = 0 if start is None else mode_number("Mode", names, start)
 
     def __repr__(self) -> str:
         start = f", start={self.names[self.start]!r}" if self.start else ""
-        return f"Mode({', '.join(map(repr, self.names))}{start}, description={self.description!r})"
+        within = f", within={self.within!r}, history={self.history!r}" if self.within else ""
+        return f"Mode({', '.join(map(repr, self.names))}{start}{within}, description={self.description!r})"
 
 
 def mode_number(place: str, names: Sequence[str], start: Any) -> int:

@@ -51,6 +51,30 @@ class RackAndPinion(Model):
         yield self.flange_a.tau == -self.radius * self.flange_b.f
 
 
+class CyclicRack(Model):
+    """A rack whose error repeats with its pitch: flange_a goes as the motor tells it, flange_b as the cart goes.
+
+    s_b = s_a + cosine cos(2 pi s_a / pitch) + sine sin(2 pi s_a / pitch). The error stays far below the pitch, so that the
+    cart never stands still while the motor turns. Dressler (2012), section 5.3, found such errors in the racks of its D1.
+    """
+
+    pitch = Parameter(0.01, unit="m", min=0.0, description="way after which the error repeats")
+    cosine = Parameter(0.0, unit="m", description="amplitude of the cosine, error at s = 0")
+    sine = Parameter(0.0, unit="m", description="amplitude of the sine")
+    s = Real(unit="m", description="position that the motor tells, of flange_a")
+    flange_a = translational.Flange()
+    flange_b = translational.Flange()
+
+    def equations(self):
+        a, b = self.flange_a, self.flange_b
+        yield require(self.pitch > 0, "expected a way above zero")
+        angle = 2 * pi * a.s / self.pitch
+        yield self.s == a.s
+        yield b.s == a.s + self.cosine * cos(angle) + self.sine * sin(angle)
+        slope = 1 + 2 * pi / self.pitch * (self.sine * cos(angle) - self.cosine * sin(angle))
+        yield a.f == -slope * b.f
+
+
 class BallScrew(Model):
     """A spindle at flange_a that moves its nut at flange_b; the nut is kept from turning."""
 
@@ -84,6 +108,7 @@ class ScrewLever(Model):
     )
     lead = Parameter(0.005, unit="m", description="by which a turn lengthens the screw; negative shortens it")
     length = Real(unit="m", description="from pivot to pivot", start=0.3)
+    s = Real(unit="m", description="way of the nut along the spindle, 0 where flange_b is at 0")
     lever = Real(unit="m", description="distance of the screw from the axis, with the sign of angle")
     flange_a = rotational.Flange()
     flange_b = rotational.Flange()
@@ -98,7 +123,8 @@ class ScrewLever(Model):
         opening = self.angle + b.phi
         squares, product = self.base**2 + self.crank**2, 2 * self.base * self.crank
         yield self.length == sqrt(squares - product * cos(opening))
-        yield self.lead * a.phi == 2 * pi * (self.length - sqrt(squares - product * cos(self.angle)))
+        yield self.s == self.length - sqrt(squares - product * cos(self.angle))
+        yield self.lead * a.phi == 2 * pi * self.s
         yield self.lever == product / 2 * sin(opening) / self.length
         # the force in the screw is 2 pi tau / lead, and acts on the lever
         yield self.lead * b.tau == -2 * pi * self.lever * a.tau

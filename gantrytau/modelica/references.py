@@ -10,16 +10,28 @@ from gantrytau.modelica import tree
 
 def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
     """An expression and all that is in it; not the names of functions."""
-    if isinstance(expression, tree.Call):
-        yield expression
-        yield from nodes_of((expression.arguments, expression.named))
-    elif isinstance(expression, (tuple, list)):
-        for one in expression:
-            yield from nodes_of(one)
-    elif isinstance(expression, tree.TreeNode):
-        yield expression
-        for name in type(expression).__slots__:
-            yield from nodes_of(getattr(expression, name))
+    left = [expression]
+    while left:
+        one = left.pop()
+        if isinstance(one, tree.TreeNode):
+            yield one
+        if isinstance(one, tree.Call):
+            left += [one.named, one.arguments]
+        elif isinstance(one, (tuple, list)):
+            left += reversed(one)
+        elif isinstance(one, tree.TreeNode):
+            left += [getattr(one, name) for name in [*type(one).__slots__][::-1]]
+
+
+def from_left(e: tree.Binary) -> list[tree.Binary]:
+    """The operators of a sum, product or the like in the order of their values, those on the left side of another first.
+
+    Without recursion: sums of machines have thousands of terms.
+    """
+    found = [e]
+    while isinstance(left := found[-1].left, tree.Binary):
+        found.append(left)
+    return found[::-1]
 
 
 def dotted(e: Any) -> str:
@@ -70,6 +82,13 @@ def component_of(call: tree.Call, reader: Any) -> Any:
     if not path or path[0][0] in reader.local or not reader.members.has(path[0][0]):
         return None
     return reader.value(replace(call.function, parts=tuple(path)))
+
+
+def subscripts_at_end(e: tree.Expression) -> tuple[tree.Expression, tuple[tree.Expression, ...]] | None:
+    """An array and the subscripts at its end; None for all else."""
+    if not isinstance(e, tree.ComponentReference) or not e.parts[-1][1]:
+        return None
+    return replace(e, parts=(*e.parts[:-1], (e.parts[-1][0], ()))), e.parts[-1][1]
 
 
 def declared_shape(e: tree.Expression, reader: Any) -> tuple[int, ...] | None:

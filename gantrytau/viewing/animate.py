@@ -102,12 +102,13 @@ def animate(
     around: Sequence[Any] = (),
     model: Shown | None = None,
 ) -> "Page":
-    """A result of `simulate`, an optimum, or a plan of `plan_calibration` in motion; lists stand side by side under `names`.
+    """What `simulate`, `optimize`, `plan_calibration` or a closed loop found, in motion; lists stand side by side.
 
-    file: where the page is saved, too; speed: seconds of the motion in one second; around: obstacles and a workspace, as of
-    `view`; model: whose motion it is, of a result that was read from a file. Actuator forces are arrows, the way of the tool
-    is a line, and a part turns red while something of it is at its limit, which optima tell. Pictures follow one another 60
-    times a second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
+    names: of those in a list; file: where the page is saved, too; speed: seconds of the motion in one second; around:
+    obstacles and a workspace, as of `view`; model: whose motion it is, of a result that was read from a file. Forces of
+    actuators are arrows, the way of the tool a line, and a part turns red while something of it is at its limit, in optima.
+    Beside a closed loop is a ghost, seen through: where the plan of each sample ends. Pictures follow one another 60 times a
+    second, more slowly where there would be more than 1800. Raises ModelError for what cannot be shown.
     """
     from gantrytau.viewing.film import film_of
 
@@ -150,7 +151,13 @@ def _at_one_clock(films: "Sequence[Film]", speed: float) -> "list[Film]":
     step = min((film.step for film in films if film.step > 0), default=0.0)
     if len(films) == 1 or step == 0:
         return list(films)
-    return [replace(film, step=step, times=_every(step * speed, film.times)) for film in films]
+    return [_every_step(film, step, speed) for film in films]
+
+
+def _every_step(film: "Film", step: float, speed: float) -> "Film":
+    """A motion, and its ghost, with pictures `step` s apart on the page."""
+    ghost = None if film.ghost is None else _every_step(film.ghost, step, speed)
+    return replace(film, step=step, times=_every(step * speed, film.times), ghost=ghost)
 
 
 def _every(step: float, times: np.ndarray) -> np.ndarray:

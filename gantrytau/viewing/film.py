@@ -10,7 +10,7 @@ import numpy as np
 from gantrytau.border import checks
 from gantrytau.border.refusal import ModelError
 from gantrytau.dae import Dae
-from gantrytau.language.self_description.appearance import Shape, Value
+from gantrytau.language.self_description.appearance import ForceArrow, PathLine, Shape, Triad, Value
 from gantrytau.results.result import Result
 from gantrytau.results.series import Series
 
@@ -34,7 +34,8 @@ class Film:
     """A result, or a pose, at times (N,) in s: those of the pictures, which follow one another by `step` s of the page.
 
     constants: numbers that the result does not hold, by name; shapes: what is seen, by the names of places; around: what
-    stands around it, in numbers; failed: pictures (N,) of poses that cannot be, which are red.
+    stands around it, in numbers; failed: pictures (N,) of poses that cannot be, which are red; ghost: the same model where
+    a controller plans to be, at the same times, seen through.
     """
 
     series: Series
@@ -45,6 +46,7 @@ class Film:
     shapes: tuple[Shape, ...] = ()
     around: tuple[Shape, ...] = ()
     failed: np.ndarray | None = None
+    ghost: "Film | None" = None
 
     @property
     def title(self) -> str:
@@ -150,7 +152,10 @@ def film_of(shown: Any, speed: float = 1.0, model: Dae | None = None, around: Se
     arcs: Sequence[Any] = getattr(shown, "arcs", ())
     bindings = tuple(Binding(arc.name, arc.begin, arc.end) for arc in arcs if arc.side in ("max", "min"))
     times = np.linspace(first, last, pictures + 1)
-    return Film(series, times, step, constants, bindings, shapes, tuple(surroundings(around)))
+    planned = getattr(shown, "planned", None)  # of a closed loop
+    bodies = tuple(shape for shape in shapes if not isinstance(shape, (ForceArrow, PathLine, Triad)))
+    ghost = Film(planned, times, step, constants, (), bodies) if isinstance(planned, Result) else None
+    return Film(series, times, step, constants, bindings, shapes, tuple(surroundings(around)), ghost=ghost)
 
 
 def series_of(verb: str, shown: Any) -> Result:

@@ -13,7 +13,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.viewing.film import Film
-from gantrytau.viewing.solids import COLOURS, Solid, extent, solids
+from gantrytau.viewing.solids import COLOURS, Solid, extent, ghosts, solids
 from gantrytau.whole_files import replacing
 
 SIDES = 24  # of a cone
@@ -30,6 +30,7 @@ OTHERS = (
     ".nc",
     ".json",
 )  # files that no page is
+GHOST = 0.35  # opacity of where a controller plans to be
 AMBIENT = 2.0  # of the light that comes from everywhere, beside that which casts shadows
 PARTS = ("bar", "ball", "body", "drive", "ground")  # what turns red at a limit
 VIEW = np.array([0.42, -0.62, 0.3])  # of the camera from the middle, in sizes of what is seen
@@ -97,6 +98,8 @@ def staged(server: Any, films: Sequence[Film], names: Sequence[str]) -> list["Pl
             scene.add_label(f"{parent}/name", name, position=np.array(above))
         scene.add_frame(f"{parent}/world", axes_length=0.06 * whole, axes_radius=0.0025 * whole)
         playing += [Player(scene, f"{parent}/{k}", film, s) for k, s in enumerate(solids(film))]
+        for k, solid in enumerate(ghosts(film)):
+            playing.append(Player(scene, f"{parent}/plan_{k}", replace(film, bindings=()), solid, GHOST))
     _stage(server, corners + shifts[:, None], whole)
     return playing
 
@@ -129,8 +132,8 @@ def _stage(server: Any, corners: np.ndarray, whole: float) -> None:
 class Player:
     """A solid on a page, moved from picture to picture where something changes."""
 
-    def __init__(self, scene: Any, name: str, film: Film, solid: Solid):
-        self.handle, self.role = _added(scene, name, solid), solid.role
+    def __init__(self, scene: Any, name: str, film: Film, solid: Solid, opacity: float | None = None):
+        self.handle, self.role = _added(scene, name, solid, opacity), solid.role
         self.shown: list[Any] = [None] * 4
         self.put(film, solid)
 
@@ -180,9 +183,11 @@ def _at_limits(film: Film, solid: Solid) -> np.ndarray:
     return found
 
 
-def _added(scene: Any, name: str, solid: Solid) -> Any:
+def _added(scene: Any, name: str, solid: Solid, opacity: float | None = None) -> Any:
     colour: dict[str, Any] = dict(color=COLOURS[solid.role])
-    if (
+    if opacity is not None:
+        colour["opacity"] = opacity
+    elif (
         solid.kind == "cuboid" and solid.role == "body"
     ) or solid.role == "around":  # what hangs on it is seen through it
         colour["opacity"] = 0.4
@@ -209,10 +214,8 @@ def _added(scene: Any, name: str, solid: Solid) -> Any:
             name, points, COLOURS[solid.role], thickness=3.0, thickness_units="screen"
         )
     mesh = _mesh(solid.file)
-    if mesh.visual.kind is None:  # a file without colours
-        return scene.add_mesh_simple(
-            name, mesh.vertices, mesh.faces, color=COLOURS[solid.role], flat_shading=True
-        )
+    if mesh.visual.kind is None or opacity is not None:  # a file without colours, or seen through
+        return scene.add_mesh_simple(name, mesh.vertices, mesh.faces, **colour, flat_shading=True)
     return scene.add_mesh_trimesh(name, mesh)
 
 

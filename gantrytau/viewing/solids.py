@@ -76,13 +76,21 @@ def extent(film: Film) -> tuple[np.ndarray, np.ndarray]:
         if isinstance(shape, Cuboid) and not isinstance(shape.size, (int, float)):
             half = np.abs(film.rotations(shape.R)) @ film.values(shape.size, (3,))[..., None] / 2
             places += [places[-1] - half[..., 0], places[-1] + half[..., 0]]
+    if film.ghost is not None:
+        places.append(np.array(extent(film.ghost)))
     every = np.concatenate(places)
     return every.min(axis=0), every.max(axis=0)
 
 
-def solids(film: Film) -> Iterator[Solid]:
-    """All solids that are seen; what has no extent is left out."""
-    low, high = extent(film)
+def ghosts(film: Film) -> Iterator[Solid]:
+    """The solids of the ghost of a film that move."""
+    if film.ghost is not None:
+        yield from (solid for solid in solids(film.ghost, film) if not solid.rests)
+
+
+def solids(film: Film, beside: Film | None = None) -> Iterator[Solid]:
+    """All solids that are seen; what has no extent is left out. beside: a film in whose sizes they are shown."""
+    low, high = extent(film if beside is None else beside)
     size = float(np.linalg.norm(high - low)) or 1.0
     arrows = (_force(film, shape) for shape in film.shapes if isinstance(shape, ForceArrow))
     largest = max((float(np.linalg.norm(f, axis=1).max()) for f in arrows), default=0.0)

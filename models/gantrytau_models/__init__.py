@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from gantrytau_models.mechanisms.bushed_links import BushedSixLinkGantryTau
     from gantrytau_models.mechanisms.delta import DeltaRobot
     from gantrytau_models.mechanisms.elastic_links import ElasticSixLinkGantryTau
+    from gantrytau_models.mechanisms.error_sources import (
+        F1OnScrews,
+        GantryTauOnRacks,
+        SaggingGantryTau,
+        SixLinkOnRacks,
+        WithRacks,
+    )
     from gantrytau_models.mechanisms.f1 import F1GantryTau
     from gantrytau_models.mechanisms.five_dof import FiveDofGantryTau
     from gantrytau_models.mechanisms.flexible import FlexibleGantryTau
@@ -44,6 +51,7 @@ __all__ = [
     "DeltaRobot",
     "ElasticSixLinkGantryTau",
     "F1GantryTau",
+    "F1OnScrews",
     "F1WithWrist",
     "Feedforward",
     "FiveBar",
@@ -52,6 +60,7 @@ __all__ = [
     "ForwardKinematics",
     "FourBar",
     "GantryTau",
+    "GantryTauOnRacks",
     "InverseDynamics",
     "InverseKinematics",
     "JointServo",
@@ -60,11 +69,14 @@ __all__ = [
     "Pendulum",
     "PidController",
     "PreslidingFriction",
+    "SaggingGantryTau",
     "SerialWrist",
     "SixLinkGantryTau",
+    "SixLinkOnRacks",
     "SixLinkWithWrist",
     "StewartPlatform",
     "TrackingController",
+    "WithRacks",
     "WithWrist",
     "cart_servos",
     "prototypes",

@@ -53,7 +53,8 @@ from gantrytau_optimica.learning import (
     square_reference,
 )
 from gantrytau_optimica.optimize import optimize, prepare
-from gantrytau_optimica.paths.path import Corner, Deviation, Path, Way
+from gantrytau_optimica.paths.path import Corner, Deviation, Path
+from gantrytau_optimica.paths.way import Way
 from gantrytau_optimica.predictive.estimators.extended_kalman import ExtendedKalman
 from gantrytau_optimica.predictive.estimators.moving_horizon import MovingHorizon
 from gantrytau_optimica.predictive.mpc import Mpc

@@ -30,12 +30,12 @@ def test_the_page_is_called_as_the_model(run, tmp_path, monkeypatch):
 @pytest.mark.parametrize("suffix", ["csv", "nc"])
 def test_a_saved_motion_is_shown(run, tmp_path, suffix):
     motion, page, still = tmp_path / f"motion.{suffix}", tmp_path / "motion.html", tmp_path / "still.html"
-    assert run("simulate", "GantryTau(L1)", "--stop", 0.1, "--points", 11, "--output", motion).exit_code == 0
-    said = run("view", "GantryTau(L1)", "--result", motion, "-o", page)
+    assert run("simulate", "Pendulum", "--stop", 0.1, "--points", 11, "--output", motion).exit_code == 0
+    said = run("view", "Pendulum", "--result", motion, "-o", page)
     assert said.exit_code == 0, said.output
-    assert run("view", "GantryTau(L1)", "-o", still).exit_code == 0
+    assert run("view", "Pendulum", "-o", still).exit_code == 0
     assert page.stat().st_size > still.stat().st_size  # pictures in a row
-    both = run("view", "GantryTau(L1)", "--result", motion, "--result", motion, "--speed", 0.1, "-o", still)
+    both = run("view", "Pendulum", "--result", motion, "--result", motion, "--speed", 0.1, "-o", still)
     assert both.exit_code == 0, both.output
     assert still.stat().st_size > page.stat().st_size
 

@@ -7,15 +7,18 @@ import pytest
 from gantrytau import (
     Array,
     Connector,
+    Flow,
     Input,
     Model,
     Parameter,
+    Propagated,
     Real,
     StructureError,
     connect,
     cos,
     der,
     exp,
+    root,
     sin,
     time,
     translate,
@@ -291,3 +294,30 @@ def test_the_text_of_the_equations_names_blocks_and_their_origin():
     assert "states: capacitor.v" in text
     assert "capacitor (Capacitor), equation " in text
     assert all("from" in line for line in text.splitlines() if line.startswith("["))
+
+
+class Arrow(Connector):
+    """A direction in a plane, whose derivative the angular velocity gives, and the torque about it."""
+
+    e = Propagated(2, rate=lambda self: self.w * ca.vertcat(-self.e[1], self.e[0]))
+    w = Propagated()
+    t = Flow()
+
+
+def test_a_direction_whose_derivative_is_given_by_the_angular_velocity_is_locked():
+    class Wheel(Model):
+        """A wheel under a torque, its direction of two half-angle coordinates and locked at 0.5 rad."""
+
+        arrow = Arrow()
+        q = Real(2, start=[0.97, 0.25])
+        w, torque = Real(), Real()
+
+        def equations(self):
+            c, s = self.q.elements()
+            yield root(self.arrow, e=ca.vertcat(c**2 - s**2, 2 * c * s), w=self.w)
+            yield self.w == 2 * (c * der(s) - s * der(c))
+            yield c**2 + s**2 == 1
+            yield 3 * der(self.w) == self.torque + 5
+            yield ca.atan2(self.arrow.e[1], self.arrow.e[0]) == 0.5
+
+    assert translate(Wheel()).start["torque"] == pytest.approx(-5)

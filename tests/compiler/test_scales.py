@@ -129,7 +129,7 @@ def test_the_start_walks_as_far_as_it_has_to():
     assert x == pytest.approx(1e6, rel=1e-12)
 
 
-@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e10])
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1.0, 1e10])
 def test_a_linkage_of_any_size_closes_with_the_same_constraints(size):
     dae = translate(FourBar(*(size * np.array([1.0, 0.3, 0.9, 0.6]))))
     assert len(dae.redundant) == 3

@@ -18,6 +18,7 @@ from gantrytau import (
     connect,
     cos,
     der,
+    if_else,
     simulate,
     sin,
     time,
@@ -134,13 +135,12 @@ def test_what_would_be_lost_is_refused(build, words):
         build()
 
 
-@pytest.mark.parametrize("phi", [0.5, 1.3, 2.0])
-def test_a_start_that_is_given_is_kept_before_those_of_the_model(phi):
+def test_a_start_that_is_given_is_kept_before_those_of_the_model():
     """The bars have starts of their own, to which the crank does not fit; it comes from outside and stays."""
-    for model in (
-        FourBar(crank=dict(phi=Start(phi))),
-        FourBar().modified(dict(crank=dict(phi=Start(phi)))),
-        with_setting(FourBar(), "crank.phi.start", phi),
+    for phi, model in (
+        (0.5, FourBar(crank=dict(phi=Start(0.5)))),
+        (1.3, FourBar().modified(dict(crank=dict(phi=Start(1.3))))),
+        (2.0, with_setting(FourBar(), "crank.phi.start", 2.0)),
     ):
         dae = translate(model)
         assert dae.start["crank.phi"] == phi
@@ -225,3 +225,32 @@ def test_an_infinite_slope_at_the_solution_is_no_obstacle_to_the_start():
     level, values = Level(rows, ("a", "b", "c"), ("u", "y", "w"), frozenset()), dict(u=0.0, y=0.0, w=0.0)
     _solve(level, ("u", "y", "w"), values, {"y"}, "title")
     assert [values["y"], values["w"] ** 3 + values["w"]] == pytest.approx([-1.5, -1.0], rel=1e-9)
+
+
+def test_a_spring_whose_length_starts_at_zero_holds_a_beam_level():  # a second: others are tried first
+    class Held(Model):
+        """A uniform beam of 1 kg and 1 m on a hinge, at rest by a spring of unknown constant, 0.1 m elongated."""
+
+        phi, w, z = (Real(start=0.0, fixed=True) for _ in range(3))
+        r, direction, spring, hinge = (Real(2) for _ in range(4))
+        length = Real(start=0.0)
+        divisor, f = Real(), Real()
+        c = Real(start=1.0)
+
+        def equations(self):
+            yield der(self.phi) == self.w
+            yield der(self.w) == self.z
+            yield der(self.c) == 0
+            yield self.r == ca.vertcat(1 - cos(self.phi), 0.2 - sin(self.phi))
+            yield self.length == ca.norm_2(self.r)
+            yield self.divisor == if_else(self.length > 1e-10, self.length, 1e-10)
+            yield self.direction == self.r / self.divisor
+            e, across = self.direction, ca.vertcat(-sin(self.phi), cos(self.phi))
+            yield self.spring[0] == self.f * (cos(self.phi) * e[0] + sin(self.phi) * e[1])
+            yield self.spring[1] == self.f * (across[0] * e[0] + across[1] * e[1])
+            yield self.f == self.c * (self.length - 0.1)
+            yield -0.5 * self.w**2 == self.spring[0] - 9.81 * sin(self.phi) + self.hinge[0]
+            yield 0.5 * self.z == self.spring[1] - 9.81 * cos(self.phi) + self.hinge[1]
+            yield self.z / 12 == (self.spring[1] - self.hinge[1]) / 2
+
+    assert translate(Held()).start["c"] == pytest.approx(9.81 / 2 / 0.1)

@@ -1,6 +1,7 @@
 """What is no mode, and what is no transition of it."""
 
 import re
+from typing import Any
 
 import pytest
 
@@ -92,3 +93,37 @@ NO_TRANSITIONS = {  # statements, each beside what is said of them
 def test_what_is_no_transition(words):
     with pytest.raises(ModelError, match=re.escape(words)):
         flatten(with_changes(NO_TRANSITIONS[words]))
+
+
+@pytest.mark.parametrize(
+    ("within", "found"),
+    [
+        ("phases.on", "within='phases.on', expected a mode of another one"),
+        ("inner.one", "within='inner.one'"),
+        ("phase", "within='phase'"),
+        ("phase.onn", "no mode 'onn'"),
+        ("mode.free", "that is not within this one, as 'phase.on'"),  # mode is within inner
+    ],
+)
+def test_modes_within_what_is_none(within, found):
+    class Charts(Base):
+        phase = Mode("on", "off")
+        inner = Mode("one", "two", within=within)
+
+        def changes(self):
+            yield from super().changes()
+            yield transition(self.phase, "on", "off", self.x > 1)
+            yield transition(self.inner, "one", "two", self.x > 1)
+
+    if within == "mode.free":
+        Charts = type("Charts", (Charts,), {"mode": Mode("free", "contact", "released", within="inner.two")})
+    with pytest.raises(ModelError, match=re.escape(found)):
+        flatten(Charts())
+
+
+def test_history_and_within_of_a_mode():
+    wrongs: list[dict[str, Any]] = [dict(history=True), dict(within=3)]
+    for wrong in wrongs:
+        with pytest.raises(ModelError, match="expected a mode of another one"):
+            Mode("one", "two", **wrong)
+    assert "within='phase.on', history=True" in repr(Mode("one", "two", within="phase.on", history=True))

@@ -14,8 +14,8 @@ import numpy as np
 
 from gantrytau import GantryTauError, ModelError, load_modelica, simulate
 from gantrytau.results.run_statistics import INTEGRATION
+from gantrytau.results.tube import leaves
 from tests.library_results.references import Example, Reference, references
-from tests.library_results.tube import leaves
 
 TOLERANCE = 1e-6  # of an experiment that says none
 PASSED, LEFT, REFUSED, NOT_RUN, NO_REFERENCE = "passed", "left", "refused", "not run", "no reference"
@@ -72,13 +72,14 @@ def outcome_of(reference: Reference, library: Path) -> Outcome:
 def _run(model: Any, reference: Reference, stop: float | None) -> Any:
     said = reference.settings
     if isinstance(reference, Example):
-        return simulate(model)
+        return simulate(model, singular="cross")
     return simulate(
         model,
         start=said.get("StartTime", 0.0),
         stop=stop,
         tolerance=said.get("Tolerance", TOLERANCE),
         points=reference.points,
+        singular="cross",
     )
 
 
@@ -95,7 +96,7 @@ def _compared(results: Sequence[Any], reference: Reference) -> tuple[str, str, f
             unknown.append(name)
             continue
         values = [np.broadcast_to(np.asarray(one[name], dtype=float), one["time"].shape) for one in results]
-        when = leaves(at, np.concatenate(values)[order], found["time"], found[name])
+        when, _ = leaves(at, np.concatenate(values)[order], found["time"], found[name])
         if when.size:
             left.append((when[0], name))
             last = max(last, when[-1])

@@ -81,6 +81,20 @@ def test_rotor_and_mass_swing_as_one_on_the_spring(kind):
     np.testing.assert_allclose(found["mass.s"], 0.1 * np.cos(w * found.time), atol=NEAR)
 
 
+def test_a_cyclic_rack_loses_no_power_and_repeats_with_its_pitch():
+    rack = gears.CyclicRack(pitch=0.02, cosine=3e-4, sine=-5e-4)  # slope from 0.82 to 1.18
+    Slide = in_a_row("Slide", motor=translational.Position(), rack=rack, load=translational.Force())
+    dae = translate(Slide())
+    s, step = np.linspace(-0.02, 0.02, 9), 1e-6
+    told = [dae.evaluate({"motor.s": x, "load.f": -100.0}) for x in s]
+    cart = np.array([at["load.flange.s"] for at in told])
+    np.testing.assert_allclose(cart[4:] - cart[:5], 0.02, atol=1e-15)
+    assert cart[4] == pytest.approx(3e-4)  # the cosine, at 0
+    ahead = np.array([dae.evaluate({"motor.s": x + step})["load.flange.s"] for x in s])
+    # virtual work: the motor holds what the load pulls times ds_b/ds_a; differences to step * 2nd derivative, 0.05
+    np.testing.assert_allclose([at["motor.f"] for at in told], 100.0 * (ahead - cart) / step, rtol=1e-4)
+
+
 def test_one_turn_of_a_ball_screw_is_its_lead():
     at = translate(Sliding(gear=gears.BallScrew(lead=0.02))).evaluate({"rotor.phi": 2 * np.pi})
     assert at["mass.s"] == pytest.approx(0.02, rel=1e-15)

@@ -326,3 +326,25 @@ def test_a_derivative_whose_factor_is_evaluated_to_zero_asks_for_none(tmp_path):
     )
     made = load_modelica(tmp_path / "c.mo")["C"]
     assert [max(translate(made(c=c)).indexed.counts) for c in (0, 2)] == [0, 1]
+
+
+def test_of_several_versions_of_a_library_the_latest_is_taken(tmp_path):
+    for version in ("9.0", "10.0"):
+        folder = tmp_path / f"L {version}"
+        folder.mkdir()
+        (folder / "package.mo").write_text("package L\nend L;")
+        (folder / "A.mo").write_text(f"within L;\nmodel A\n  Real x = {version};\nend A;")
+        (folder / "B.mo").write_text("within L;\nmodel C\nend C;")
+    (tmp_path / "m.mo").write_text("model M\n  L.A a;\nend M;\nmodel N\n  L.B b;\nend N;")
+    library = load_modelica(tmp_path / "m.mo", libraries=[tmp_path])
+    assert simulate(library["M"](), stop=1.0).final("a.x") == 10
+    with pytest.raises(
+        ModelError,
+        match=r"line 2, column 7: found 'L\.C' in the file B\.mo of L, expected the one class L\.B",
+    ):
+        library["N"]
+
+
+def test_a_sum_of_a_machine_has_as_many_terms_as_it_likes(tmp_path):
+    (tmp_path / "m.mo").write_text(f"model M\n  Real x = {' + '.join(['time'] * 2000)};\nend M;")
+    assert simulate(load_modelica(tmp_path / "m.mo")["M"](), stop=1.0).final("x") == 2000

@@ -180,6 +180,15 @@ INSTANTS = """package Instants
     table := {{1, 2}, {3, 4}};
     table[place, :] := {time, 5};
   end Buffer;
+  model Turns "the place of what is changed varies, too"
+    Integer count[3](each start = 0), k(start = 1), older(start = 0);
+  algorithm
+    when sample(0.1, 0.2) then
+      older := pre(count[k]);
+      count[k] := pre(count[k]) + 1;
+      k := mod(pre(k), 3) + 1;
+    end when;
+  end Turns;
   model Button "set at 1 and 3, reset at 2 and 3"
     Boolean on(start = false);
   algorithm
@@ -227,6 +236,17 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
     assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
     with pytest.raises(SolveError):
         simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
+
+
+def test_the_value_before_an_instant_at_the_place_of_now(instants):
+    result = simulate(instants["Instants.Turns"](), stop=1.0)
+    assert [result.final(name) for name in ("count[1]", "count[2]", "count[3]", "k", "older")] == [
+        2,
+        2,
+        1,
+        3,
+        1,
+    ]
 
 
 def test_the_later_of_two_whens_of_an_algorithm_wins(instants):
@@ -300,17 +320,42 @@ BUSES = """package Buses
     connect(bus.many[2], d.u);
     connect(ground.p, bus.pin);
   end Whole;
+  model Rows "arrays of components, and parts of them, as a whole"
+    Bus bus;
+    Source s[4](k = {1, 2, 3, 4});
+    Sink a[2], b[2];
+    In none[0];
+    Out nothing[0];
+  equation
+    connect(s[1:3].y, bus.row);
+    connect(bus.row[2:3], a.u);
+    connect(s[3:4].y, b.u);
+    connect(none, nothing);
+  end Rows;
+  model Wrong
+    Bus bus;
+    Source s[3];
+    Sink a[2];
+  equation
+    connect(s.y, bus.row);
+    connect(bus.row, a.u);
+  end Wrong;
 end Buses;
 """
 
 
 def test_an_expandable_connector_has_what_is_connected_to_it(tmp_path):
     (tmp_path / "buses.mo").write_text(BUSES)
-    result = simulate(load_modelica(tmp_path / "buses.mo")["Buses.Whole"](), stop=1.0)
+    library = load_modelica(tmp_path / "buses.mo")
+    result = simulate(library["Buses.Whole"](), stop=1.0)
     assert [result.final(f"{name}.twice") for name in "abcd"] == [4, 6, 8, 12]
     assert result.final("unit.bus.speed") == 2
     assert result.final("ground.p.v") == pytest.approx(0.5)
     assert not any("spare" in name for name in result.names)
+    result = simulate(library["Buses.Rows"](), stop=1.0)
+    assert [result.final(f"{name}.twice") for name in ("a[1]", "a[2]", "b[2]")] == [4, 6, 8]
+    with pytest.raises(ModelError, match=r"found connectors of the sizes \[3\] and \[2\], expected one size"):
+        simulate(library["Buses.Wrong"](), stop=1.0)
 
 
 GUESSED = """package Guessed
@@ -341,3 +386,23 @@ def test_a_guess_that_initial_equations_determine_is_left_to_them(tmp_path):
     (tmp_path / "guessed.mo").write_text(GUESSED)
     result = simulate(load_modelica(tmp_path / "guessed.mo")["Guessed.Whole"](), stop=1.0)
     assert result.at(0.0, "lag.y") == pytest.approx(4)
+
+
+CHOICES = """package Choices
+  type E = enumeration(a, b, c);
+  model M
+    E last[2] = E.b:E.c;
+    Real x[3] = {if k == E.b then time else 0 for k in E.a:E.c}, y[E];
+  equation
+    for k in E.a:E.c loop
+      y[k] = if k <> E.c then Integer(k) else 10;
+    end for;
+  end M;
+end Choices;
+"""
+
+
+def test_a_range_of_an_enumeration_holds_its_values(tmp_path):
+    (tmp_path / "choices.mo").write_text(CHOICES)
+    result = simulate(load_modelica(tmp_path / "choices.mo")["Choices.M"](), stop=1.0)
+    assert [result.final(n) for n in ("last[1]", "x[1]", "x[2]", "y[2]", "y[3]")] == [2, 0, 1, 2, 10]

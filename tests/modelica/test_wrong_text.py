@@ -57,6 +57,22 @@ WRONG = (  # text of a model, line and column, words
 FUNCTION = "function f\n  input Real u[2];\n  output Integer n = integer(u[1]);\nend f;\n"
 MEANINGS = (  # where a wrong model would run: text, line and column, words
     (
+        "record R\n  Real a;\nend R;\nrecord S\n  Real b;\nend S;\nmodel M\n  R r = S(time);\nend M;",
+        "8:9",
+        "found a value without 'a' for a record, expected one of its type",
+    ),
+    (
+        "function f\n  input Real a, b;\n  output Real y = a * b;\nalgorithm\nend f;\n"
+        "model M\n  Real x[2] = f({time, 2}, {1, 2, 3});\nend M;",
+        "7:15",
+        "found arrays of the sizes \\[2\\] and \\[3\\] for scalars of f, expected one size",
+    ),
+    (
+        "model M\n  Real v[2] = {1, time};\n  Real y[2] = v ^ 2;\nend M;",
+        "3:15",
+        "found \\[2\\] and a scalar beside '\\^', expected a square matrix",
+    ),
+    (
         "model M\n  Real x = sin(Integer(time));\nend M;",
         "2:16",
         "found Real in Integer\\(\\), expected a value of an enumeration",

@@ -19,9 +19,11 @@ from gantrytau import (
     between,
     check,
     der,
+    logic_or,
     pre,
     reinit,
     simulate,
+    sin,
     time,
     transition,
     translate,
@@ -325,3 +327,59 @@ def test_modes_are_drawn_as_bands(tmp_path):
     edges = [patch.get_extents().transformed(bands.transData.inverted()).intervalx for patch in bands.patches]
     np.testing.assert_allclose(np.ravel(edges)[1:-1:2], [*instants(found)], atol=1e-9)
     assert len(line.lines) == 1
+
+
+class Lamp(Model):
+    """Is on from 1 s to 3.3 s, and from 5 s; while on it is bright from where a sine is above 0.5 to where it is below -0.5,
+    and counts in parallel how often the sine was positive.
+    """
+
+    x = Real(unit="1", start=0.0, fixed=True)
+    phase = Mode("off", "on")
+    light = Mode("dark", "bright", within="phase.on")
+    half = Mode("low", "high", within="phase.on", history=True)
+    count = Discrete(0.0, unit="1")
+
+    def equations(self):
+        wave = sin(2 * np.pi * time)
+        yield der(self.x) == self.light.choose(dark=0.0, bright=1.0)
+        yield transition(self.phase, "off", "on", self.on())
+        yield transition(self.phase, "on", "off", between(3.3, time, 5.0))
+        yield transition(self.light, "dark", "bright", wave >= 0.5)
+        yield transition(self.light, "bright", "dark", wave <= -0.5)
+        yield transition(self.half, "low", "high", wave >= 1e-6, self.count == pre(self.count) + 1)
+        yield transition(self.half, "high", "low", wave <= -1e-6)
+
+    def on(self):
+        return logic_or(between(1.0, time, 3.3), time > 5.0)
+
+
+class LampThatRemembers(Lamp):
+    """The same, as bright as it was when it comes on."""
+
+    light = Mode("dark", "bright", within="phase.on", history=True)
+
+
+@pytest.mark.parametrize(("kind", "entered"), [(Lamp, 1 / 12), (LampThatRemembers, 0.0)])
+def test_a_mode_within_a_mode_changes_there_alone(kind, entered):
+    lamp = simulate(kind(), stop=7.0, tolerance=TOLERANCE)
+    left = 2 * 0.5 + 0.3 - 1 / 12  # bright from 1/12 to 7/12 of each period, the third ends at 3.3 s
+    outside = 1.7 if kind is LampThatRemembers else 0.0
+    assert lamp.at(3.3, "x") == pytest.approx(left, abs=NEAR)
+    assert lamp.at(5.9, "x") == pytest.approx(left + outside + 7 / 12 - entered, abs=NEAR)
+    assert lamp.final("count") == 4  # at 1, 2, 3 and 6 s; it was left high at 3.3 s and is high at 5 s
+
+
+def test_the_outer_mode_changes_first():
+    class Both(Model):
+        x = Real(unit="1", start=0.0, fixed=True)
+        count = Discrete(0.0, unit="1")
+        phase, step = Mode("on", "off"), Mode("first", "second", within="phase.on")
+
+        def equations(self):
+            yield der(self.x) == 1.0
+            yield transition(self.step, "first", "second", self.x >= 0.5, self.count == pre(self.count) + 1)
+            yield transition(self.phase, "on", "off", self.x >= 0.5)
+
+    found = simulate(Both(), stop=1.0)
+    assert (found.final("phase"), found.final("step"), found.final("count")) == (1, 0, 0)

@@ -20,16 +20,18 @@ from numpy.typing import ArrayLike
 from gantrytau.border.checks import check_words, number
 from gantrytau.border.refusal import GantryTauError, ModelError, SolveError, did_you_mean
 from gantrytau.interruption import on_interrupt
-from gantrytau_fmu.controller.board import ACTIVATE, STATES, Board, State
+from gantrytau_fmu.controller.board import STATES, Board, State
 from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.client_line import ClientLine
 from gantrytau_fmu.controller.clients import Client, Sample
-from gantrytau_fmu.controller.controller_checks import check_kinds
+from gantrytau_fmu.controller.controller_checks import check_kinds, check_references, check_step
+from gantrytau_fmu.controller.exchange.periodic_client import PeriodicClient
 from gantrytau_fmu.controller.exchange.remote_client import RemoteClient
 from gantrytau_fmu.controller.exchange.server import Server
 from gantrytau_fmu.controller.external_kinematics import ExternalKinematics
 from gantrytau_fmu.controller.laws.law import LawFunction
-from gantrytau_fmu.controller.laws.users_law import users_law
+from gantrytau_fmu.controller.laws.periodic_law import PeriodicFunction, PeriodicLaw
+from gantrytau_fmu.controller.laws.users_law import tunables_of, users_law
 from gantrytau_fmu.controller.planned_changes import ROUNDING, PlannedChanges
 from gantrytau_fmu.controller.reference_path import AxisLimits, ReferencePath
 from gantrytau_fmu.controller.sample_clock import VirtualClock, WallClock
@@ -45,8 +47,9 @@ class Controller:
     """A plant under references that a user's controller and clients overwrite; it runs once.
 
     plant: model, FMU file or `PythonComponent`; its inputs take the references. controller: the same, or a function
-    `law(t, values) -> {reference: value}`, or a shared library, see `laws/compiled_law.py`. clock: "virtual" waits for all
-    clients, so that equal runs have equal logs, `patience` s at most; "wall" goes on every `period`, s.
+    `law(t, values) -> {reference: value}`, or a shared library, see `laws/compiled_law.py`; None: the references as they
+    are, or those of a law that `under` is given. clock: "virtual" waits for all clients, so that equal runs have equal logs,
+    `patience` s at most; "wall" goes on every `period`, s.
     references: what the plant follows where nobody overwrites it: name -> number, vector, function of time, Samples or
     signal; by default the start values of the inputs. limits: `AxisLimits` by input. kinematics: poses are the references
     then. parameters: `Channel` -> value, tunable, beside those of the controller; `f_activate` from 0 to 1 is always there.
@@ -58,7 +61,7 @@ class Controller:
     def __init__(
         self,
         plant: Source,
-        controller: Source | LawFunction,
+        controller: Source | LawFunction | None = None,
         *,
         period: float = 0.004,
         clock: Literal["virtual", "wall"] = "virtual",
@@ -78,11 +81,12 @@ class Controller:
         self._clock = WallClock(self.period) if clock == "wall" else VirtualClock(self.period, patience)
         check_kinds(dict(limits=limits, references=references, parameters=parameters), kinematics, clients)
         self._plant = SteppedPart("plant", plant, starts)
+        check_step(self._plant.component, self.period)
         self._path = ReferencePath(self._plant, limits or {}, kinematics, self.period)
         self._references = dict(references or {})
-        self._check_references()
-        self._law = users_law(controller, wires or {})
-        self.tunables, self._tuned = self._all_tunables(parameters or {})
+        check_references(self._path.declaration, self._references, kinematics)
+        self._law, self._led = users_law(controller, wires or {}), controller is not None
+        self.tunables, self._tuned = tunables_of(self._law, parameters or {})
         self._lines = list[ClientLine]()
         self._state: State = state
         self._coming: State = self._state
@@ -236,6 +240,40 @@ class Controller:
             raise SolveError("controller: interrupted before its first sample", time=0.0)
         return self._result(kept, ended, begin)
 
+    @property
+    def plant_inputs(self) -> dict[str, str] | None:
+        """Scalar references that a law of `under` gives, with their units; None where the user's controller gives them."""
+        return None if self._led else _units(self._path.declaration)
+
+    @property
+    def plant_outputs(self) -> dict[str, str]:
+        """What is measured of the plant: scalars with their units."""
+        return _units(self._plant.outputs)
+
+    def under(
+        self,
+        law: PeriodicFunction,
+        *,
+        every: int,
+        known: Sequence[str],
+        gives: Mapping[str, str],
+        stop: float,
+    ) -> ControlledResult:
+        """`run` with law(t, {known: value}) -> {name: value} called at every so many samples, as the one that an Mpc has.
+
+        gives: name -> unit. Without a controller of the user the law gives references, at once: `applied.x` in the result.
+        Else it is a client `mpc` in a thread, `mpc.x` are its answers, and that to sample k acts in sample k + every.
+        """
+        if not self._led:
+            self._law = PeriodicLaw(law, every, known, list(gives))
+            self._law.fit(self._board, self._path.declaration)
+            return self.run(stop)
+        self.attach(PeriodicClient(LED, law, every, known, gives))
+        found = self.run(stop)
+        if failure := found.timing.clients[LED].failure:
+            raise SolveError(f"controller: the client {LED} {failure}", time=found.time[-1], result=found)
+        return found
+
     def _samples(self, count: int, drives: Sequence[Drive], log: SampleLog) -> str:
         """All samples; why they ended."""
         measured, asked = self._measured, False
@@ -336,33 +374,6 @@ class Controller:
         self._law.fit(board, self._path.declaration)
         return board
 
-    def _all_tunables(self, parameters: Mapping[Channel, ArrayLike]) -> tuple[Declaration, Values]:
-        own = self._law.tunables
-        channels = [*parameters, *own]
-        values: dict[str, ArrayLike] = {channel.name: value for channel, value in parameters.items()}
-        values |= {name: self._law.tuned[place] for name, place in own.slices.items()}
-        if ACTIVATE.name not in values:
-            channels, values = [ACTIVATE, *channels], {ACTIVATE.name: 0.0} | values
-        tunables = Declaration(channels)
-        found = tunables.vector(values)
-        if refusal := tunables.refusal(found):
-            raise ModelError(f"parameters: {refusal}", argument="parameters")
-        return tunables, found
-
-    def _check_references(self) -> None:
-        declared = self._path.declaration
-        for name in self._references:
-            if name not in declared:
-                raise ModelError(
-                    f"references: there is no '{name}'{did_you_mean(str(name), declared.names)}",
-                    argument="references",
-                )
-        for name in () if self._path.kinematics is None else self._path.kinematics.declaration.names:
-            if name not in self._references:
-                raise ModelError(
-                    f"references: found no '{name}', expected the pose to begin with", argument="references"
-                )
-
     def _drives(self, stop: float) -> list[Drive]:
         found, first = list[Drive](), self._plant.first_inputs
         for channel in self._path.declaration:
@@ -381,4 +392,9 @@ def _nominal(drives: Sequence[Drive], t: float) -> Values:
         raise SolveError(str(error), time=t) from error
 
 
+def _units(declaration: Declaration) -> dict[str, str]:
+    return {name: channel.unit for channel in declaration for name in channel.elements}
+
+
+LED = "mpc"  # the client that is a law of `under`
 _GROUPS = ("the parameters", "the plant", "the references")

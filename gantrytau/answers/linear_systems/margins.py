@@ -39,17 +39,6 @@ class Margins(Record):
     M_t_frequency: float
     bandwidth: float
 
-    @property
-    def disk_gain(self) -> tuple[float, float]:
-        """Factors of the gain which the disk margin allows, while the phase changes as well."""
-        least = max(0.0, (2 - self.disk) / (2 + self.disk))
-        return least, (1 / least if least else np.inf)
-
-    @property
-    def disk_phase(self) -> float:
-        """Change of phase in deg, to both sides, which the disk margin allows, while the gain changes as well."""
-        return float(np.degrees(2 * np.arctan(self.disk / 2)))
-
 
 def margins_of(loop: SisoSystem) -> Margins:
     """All margins of an open loop."""

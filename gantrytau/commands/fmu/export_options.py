@@ -61,3 +61,11 @@ Find = Annotated[list[str] | None, _names("Its outputs, separated by commas.", "
 States = Annotated[list[str] | None, _names("Preferred states, separated by commas.", "chosen by gantrytau")]
 Stop = Annotated[float | None, _time("Default experiment: its end, in s.", "1.0")]
 Step = Annotated[float | None, _time("Default experiment: step of Co-Simulation, in s.", "0.004")]
+Reference = Annotated[
+    bool,
+    typer.Option(
+        "--reference",
+        help="Put reference results until the end of the experiment into the file, by which 'check --run' judges it.",
+        rich_help_panel=EXPERIMENT,
+    ),
+]

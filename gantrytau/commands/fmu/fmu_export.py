@@ -35,6 +35,7 @@ def export(
     states: export_options.States = None,
     stop: export_options.Stop = None,
     step: export_options.Step = None,
+    reference: export_options.Reference = False,
     prototype: PrototypeName = None,
     set_: Settings = None,
     json: Json = False,
@@ -63,6 +64,7 @@ def export(
             "fmi": export_options.VERSIONS.get(fmi, fmi),
             "interfaces": export_options.INTERFACES[interface],
             "build": wanted,
+            "reference": reference,
         }
         chosen = build(model, prototype, set_ or ())
         flat = flatten(chosen.model)

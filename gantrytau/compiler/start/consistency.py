@@ -55,7 +55,7 @@ def solve_levels(
             try:
                 (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
             except InitializationError:
-                if not _follows(level, moving, values, chosen) and not _solve_switching(
+                if not _follows(level, moving, values, chosen, started, title) and not _solve_switching(
                     level, moving, values, started, title
                 ):
                     raise
@@ -82,17 +82,32 @@ def _solved(
     return True
 
 
-def _follows(level: Level, moving: Sequence[str], values: dict[str, float], chosen: frozenset[str]) -> bool:
-    """Whether all values follow from one another, equation by equation, once the starts of the model give way, as
-    signals do: through what switches on what was just computed, steps of all at once go to and fro.
+def _follows(
+    level: Level,
+    moving: Sequence[str],
+    values: dict[str, float],
+    chosen: frozenset[str],
+    started: frozenset[str],
+    title: str,
+) -> bool:
+    """Whether values follow from one another, equation by equation, once the starts of the model give way, as signals do.
+
+    Steps of all at once go to and fro through what switches on what was just computed, and lead nowhere from the length 0
+    of a spring, by which its direction is divided; where equations are left, steps follow from the values found.
     """
     place = level.place
     given = np.array([values[n] for n in level.leaves])
     found = propagated(level, given, {place[n] for n in moving if n in place and n not in chosen})
+    if not np.all(np.isfinite(found)):
+        return False
+    followed = {**values, **{n: float(found[place[n]]) for n in moving if n in place}}
     f, _ = level.look(found)
     if not np.all(np.abs(f) <= SOLVED * level.sizes(list(range(len(f))), found)):
-        return False
-    values.update((n, float(found[place[n]])) for n in moving if n in place)
+        try:
+            _solve(level, moving, followed, started, title, propagate=False)
+        except InitializationError:
+            return False
+    values.update(followed)
     return True
 
 

@@ -11,7 +11,7 @@ from gantrytau.compiler.aliases import Reduced
 from gantrytau.compiler.index_reduction import Indexed
 from gantrytau.compiler.refusals import nearest_words
 from gantrytau.compiler.start.consistency import solve_levels
-from gantrytau.compiler.start.level import Level
+from gantrytau.compiler.start.level import Level, joined
 from gantrytau.compiler.start.start_values import StartValues
 from gantrytau.compiler.symbol_spaces import values_at
 from gantrytau.flattening.flat_model import FlatModel
@@ -144,10 +144,5 @@ def _with_initial(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> lis
 
 def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:
     rows = reduced.to_reduced(ca.vertcat(*(e.residual for e in flat.initial_equations))).elements()
-    return Level(
-        tuple(r for s in stages for r in s.residuals) + tuple(rows),
-        tuple(n for s in stages for n in s.names)
-        + tuple(f"initial equation of {e.name}" for e in flat.initial_equations),
-        tuple(n for s in stages for n in s.unknowns),
-        frozenset(reduced.table.independent),
-    )
+    names = tuple(f"initial equation of {e.name}" for e in flat.initial_equations)
+    return joined([*stages, Level(tuple(rows), names, ())])

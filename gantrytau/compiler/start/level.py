@@ -131,3 +131,13 @@ class Level:
         kept = np.flatnonzero(place[self.entries[1]] >= 0)
         rows, columns_of, shape = *(side[kept] for side in self.entries), (len(self.residuals), len(columns))
         return lambda entries: matrix_of(entries[kept], rows, place[columns_of], shape)
+
+
+def joined(whole: Sequence[Level]) -> Level:
+    """Levels as one."""
+    return Level(
+        tuple(r for level in whole for r in level.residuals),
+        tuple(n for level in whole for n in level.names),
+        tuple(n for level in whole for n in level.unknowns),
+        whole[0].exact,
+    )

@@ -16,13 +16,15 @@ class End(NamedTuple):
     """One side of a connection: the members of expandable connectors on the way, and what stands there in the end.
 
     way: pairs of a connector and a name; last: the component, None where it is not declared; bus: the instance, if it is an
-    expandable connector; number: the subscript behind an undeclared name, 0 without one.
+    expandable connector; number: the subscript behind an undeclared name, 0 without one; above: sizes of the arrays of
+    components that hold the last one.
     """
 
     way: list[tuple[Any, str]]
     last: Any
     bus: Any
     number: int
+    above: tuple[int, ...] = ()
 
 
 def is_expandable(structure: Any) -> bool:
@@ -86,26 +88,30 @@ def _each(items: Any, reader: Any) -> Iterator[tuple[Any, Any]]:
 
 def _end(reference: Any, structure: Any, reader: Any) -> End | None:
     """What a side of a connection leads to; None for what is absent, or an array of components as a whole."""
-    here, one, way = structure, None, []
+    here, one, way, above = structure, None, [], ()
     for k, (name, subscripts) in enumerate(reference.parts):
         one = here.members.get(name)
         if is_expandable(here):
             way.append((here, name))
         if one is None:
             last = k + 1 == len(reference.parts)
-            number = reader.places(subscripts[0], 10**6) + 1 if len(subscripts) == 1 else 0
+            places = reader.places(subscripts[0], 10**6) if len(subscripts) == 1 else -1
+            number = 1 + (places if isinstance(places, int) else max(places, default=-1))
             return End(way, None, None, number) if way and last else None
         if not one.present:
             return None
         if one.primitive is not None:
-            return End(way, one, None, 0)
-        if len(subscripts) != len(one.shape):
-            return End(way, one, None, 0)
-        place = 0
-        for subscript, size in zip(subscripts, one.shape, strict=True):
-            place = place * size + reader.places(subscript, size)
+            return End(way, one, None, 0, above)
+        every = (*subscripts, *[tree.Mark(0, ":")] * (len(one.shape) - len(subscripts)))
+        places = [reader.places(*axis) for axis in zip(every, one.shape, strict=True)]
+        many = tuple(len(place) for place in places if isinstance(place, list))
+        if many and (k + 1 == len(reference.parts) or 0 in many):
+            return End(way, one, None, 0, above)
+        above, place = (*above, *many), 0
+        for chosen, size in zip(places, one.shape, strict=True):
+            place = place * size + (chosen if isinstance(chosen, int) else chosen[0])
         here = one.children[place]
-    return End(way, one, here if is_expandable(here) else None, 0)
+    return End(way, one, here if is_expandable(here) and not above else None, 0, above)
 
 
 def _expanded(buses: list[Any], connections: list[tuple[End, End]]) -> bool:
@@ -125,7 +131,8 @@ def _expanded(buses: list[Any], connections: list[tuple[End, End]]) -> bool:
         for end, other in ((a, b), (b, a)):
             for bus, name in end.way:
                 known = used[id(bus)].get(name) or bus.scope.elements.get(name)
-                made = _alike(other.last, name) if known is None and other.last is not None else known
+                new = known is None and other.last is not None
+                made = _alike(other.last, name, other.above) if new else known
                 used[id(bus)][name] = made
                 sizes[id(bus), name] = max(sizes.get((id(bus), name), 0), end.number)
     for bus in buses:  # the outer ones first
@@ -154,10 +161,10 @@ def _expanded(buses: list[Any], connections: list[tuple[End, End]]) -> bool:
     return changed
 
 
-def _alike(one: Any, name: str) -> Element:
-    """The declaration of a member of the type of a component."""
+def _alike(one: Any, name: str, above: tuple[int, ...]) -> Element:
+    """The declaration of a member of the type of a component; above: sizes of the arrays of components that hold it."""
     clause, scope = one.clause
-    sizes = tuple(tree.Number(clause.at, str(size)) for size in one.shape)
+    sizes = tuple(tree.Number(clause.at, str(size)) for size in (*above, *one.shape))
     declared = tree.ComponentDeclaration(clause.at, None, None, name, sizes, None, None)
     words = tuple(word for word in clause.prefixes if word == "flow")
     made = replace(clause, prefixes=words, subscripts=(), components=(declared,), constraint=None)

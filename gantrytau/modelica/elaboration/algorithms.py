@@ -16,10 +16,10 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope
-from gantrytau.modelica.elaboration.statements import action_of, looped
+from gantrytau.modelica.elaboration.statements import action_of, looped, pairs
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
-from gantrytau.modelica.records.assigned import chosen_value, most_rounds, with_part
+from gantrytau.modelica.records.assigned import chosen_value, most_rounds, unassigned, value_before, with_part
 from gantrytau.modelica.records.operators import function_for
 from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import Members, holding, references
@@ -111,7 +111,8 @@ class Execution:
             else:
                 run.run([item])
         for name in dict.fromkeys(targets(items)):
-            yield ca.SX(values.to_casadi(reader.members.member(name))) == values.to_casadi(run.known[name])
+            for left, right in pairs(reader.members.member(name), run.known[name]):
+                yield left == right
 
     def _refuse_given(self, target: tree.ComponentReference, reader: Interpreter) -> None:
         """TextError where what is assigned is known from outside."""
@@ -222,10 +223,10 @@ def stated_by_algorithm(
     whens = [one for one in items if isinstance(one, tree.Branching) and one.word == "when"]
     held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
     names = [n for n in dict.fromkeys(targets(items)) if n not in held]
-    run = Execution(reader, dict.fromkeys(names))
+    run = Execution(reader, {n: unassigned(reader.members.member(n)) for n in names})
     run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.shape(n))}
     run.known |= {n: reader.members.member(n) for n in held}
-    old = {n: values.called("pre", [one], {}) for n, one in run.known.items() if n in held}
+    old = {n: value_before(one) for n, one in run.known.items() if n in held}
     for item in items:
         if item in whens:
             before = replace(run, known={**run.known, **old})
@@ -239,12 +240,12 @@ def stated_by_algorithm(
     for name in names:
         if wanted is not None and name not in wanted:
             continue
-        left, right = values.to_casadi(reader.members.member(name)), values.to_casadi(run.known[name])
-        if right is None:
+        if _is_open(run.known[name]):
             raise ModelError(
                 f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
-        yield ca.SX(left) == right
+        for left, right in pairs(reader.members.member(name), run.known[name]):
+            yield left == right
 
 
 def called_class(
@@ -272,12 +273,9 @@ def called_class(
     whole = definition.kind == "record"
     inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
-    mapped = next((n for n, one in given.items() if not record and is_longer(inputs[n], one)), None)
-    if mapped is not None:
-        longer = {n for n, one in given.items() if is_longer(inputs[n], one)}
-        count = range(len(given[mapped]))
-        all_given = [{n: one[k] if n in longer else one for n, one in given.items()} for k in count]
-        each = [called_class(scope, (), one, beyond, known) for one in all_given]
+    longer = [] if record else [n for n, one in given.items() if is_longer(inputs[n], one)]
+    if longer:
+        each = [called_class(scope, (), one, beyond, known) for one in _one_by_one(scope, given, longer)]
         return values.array(each)
     if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
@@ -305,6 +303,17 @@ def called_class(
     return found if len(found) != 1 else first_result(found)
 
 
+def _one_by_one(
+    scope: ClassScope, given: Mapping[str, Any], longer: Sequence[str]
+) -> Iterator[Mapping[str, Any]]:
+    """Arguments of each call of a function of scalars, of which some are given arrays."""
+    if len({len(given[n]) for n in longer}) > 1:
+        found = " and ".join(values.size_words(given[n]) for n in longer)
+        raise ModelError(f"found arrays of the sizes {found} for scalars of {scope.name}, expected one size")
+    for k in range(len(given[longer[0]])):
+        yield {n: one[k] if n in longer else one for n, one in given.items()}
+
+
 def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:
     """The value of an external function, whose outputs may stand among the arguments."""
     name = external.function or scope.definition.name
@@ -322,6 +331,8 @@ def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution
 
 
 def _is_open(value: Any) -> bool:
+    if isinstance(value, (list, RecordValue)):
+        return any(map(_is_open, value.values() if isinstance(value, RecordValue) else value))
     return value is None or (isinstance(value, np.ndarray) and any(one is None for one in value.flat))
 
 
@@ -351,13 +362,19 @@ def _initial(element: Element, run: Execution, holder: Members | None, needed: b
         return replace(reader, scope=said.scope).value(said.value)
     if needed:
         raise ModelError(f"found no value for '{name}' of {run.reader.scope.name}, expected one")
-    sizes = [*element.declaration.subscripts, *element.clause.subscripts]
-    if any(isinstance(one, tree.Mark) for one in sizes) or not sizes:
-        kind = element.scope.find_class(element.clause.type, element.clause.at)
-        members = kind.elements if kind.definition.kind == "record" else {}
-        given = ((n, said.inner.get(n)) for n in members)
-        known = {
-            n: one and one.value and replace(reader, scope=one.scope).value(one.value) for n, one in given
-        }
-        return RecordValue(known, kind) if members else None
-    return np.empty([reader.value(one) for one in sizes], dtype=object)
+    return _unset(element, reader)
+
+
+def _unset(element: Element, reader: Interpreter) -> Any:
+    """What a variable of a function is before it is assigned: None, also for each element and each member of a record."""
+    sizes, said = [*element.declaration.subscripts, *element.clause.subscripts], element.modifier.inner
+    if any(isinstance(one, tree.Mark) for one in sizes):
+        return None
+    kind, found = element.scope.find_class(element.clause.type, element.clause.at), None
+    if kind.definition.kind == "record":
+        given = {n: one for n in kind.elements if (one := said.get(n)) is not None and one.value is not None}
+        known = {n: replace(reader, scope=one.scope).value(one.value) for n, one in given.items()}
+        inner = {n: e for n, e in kind.elements.items() if n not in known}
+        own = {n: _unset(e, replace(reader, scope=e.scope, local={})) for n, e in inner.items()}
+        found = RecordValue({n: {**known, **own}[n] for n in kind.elements}, kind)
+    return values.called("fill", [found, *map(reader.value, sizes)], {}) if sizes else found

@@ -6,6 +6,9 @@ from functools import reduce
 from pathlib import Path
 from typing import Any, ClassVar, Self, cast
 
+import casadi as ca
+import numpy as np
+
 from gantrytau.border.refusal import ModelError
 from gantrytau.language.declarations import Array, Discrete
 from gantrytau.language.events import WhenChain
@@ -46,7 +49,7 @@ from gantrytau.modelica.elaboration.statements import (
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.elaboration.values import to_casadi
 from gantrytau.modelica.elaboration.whens import at_start, begun, follows, set_by_whens
-from gantrytau.modelica.overdetermined.records import closing
+from gantrytau.modelica.overdetermined.records import closing, is_connector
 from gantrytau.modelica.references import dotted, nodes_of, whole_name
 
 TAKEN = "a name that is taken, expected another name"
@@ -117,9 +120,8 @@ class ModelicaConnector(TextClass, Connector):
 
         def residual(structure: Structure, one: Any, another: Any) -> Any:
             function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
-            return to_casadi(
-                structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
-            )
+            found = structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            return to_casadi(found) if np.size(found) else ca.SX(0, 1)
 
         yield from closing(self, other, residual)
 
@@ -150,7 +152,7 @@ def _known(one: ClassMember) -> Any:
 def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
     """The class of a structure all of whose sizes and conditions have been asked for; base: one it is a variant of."""
     scope = structure.scope
-    kind: type[Any] = base or (ModelicaConnector if _is_connector(structure) else ModelicaModel)
+    kind: type[Any] = base or (ModelicaConnector if is_connector(structure) else ModelicaModel)
     _refuse_kind(structure, kind._kinds)
     body: dict[str, Any] = {
         "__module__": Path(scope.source.name).name,
@@ -197,7 +199,7 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
-    if _is_connector(structure):
+    if is_connector(structure):
         return type(scope.definition.name, (kind,), body)
     body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
     body["annotated_experiment"] = experiment_of(structure)
@@ -210,10 +212,6 @@ def _asks_for_start(structure: Structure) -> bool:
     nodes = (node for section in structure.scope.sections for node in nodes_of(section.items))
     calls = (one for one in nodes if isinstance(one, tree.Call) and id(one) not in alone)
     return any(one.function.parts[0][0] == "initial" for one in calls)
-
-
-def _is_connector(structure: Structure) -> bool:
-    return structure.scope.definition.kind == "connector"
 
 
 def _refuse_kind(structure: Structure, kinds: Collection[str]) -> None:
@@ -261,7 +259,10 @@ def _held_by_equations(structure: Structure) -> Iterator[str]:
 
 
 def _held(structure: Structure) -> Iterator[str]:
-    """Names of what a `when`, or an equation that asks for values before, sets."""
+    """Names of what a `when`, or an equation that asks for values before, sets; all of a record that is set."""
+    around, name = structure.around, structure.path.rpartition(".")[2]
+    if around is not None and structure.scope.definition.kind == "record" and name in set(_held(around)):
+        yield from structure.names()
     yield from _held_by_equations(structure)
     for item in whens_in(structure):
         for _, items in item.branches:

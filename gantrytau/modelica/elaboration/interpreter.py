@@ -23,7 +23,9 @@ from gantrytau.modelica.references import (
     called_function,
     component_of,
     declared_shape,
+    from_left,
     function_name,
+    subscripts_at_end,
     whole_name,
 )
 
@@ -111,11 +113,8 @@ class Interpreter:
         return e.value
 
     def _literal(self, e: tree.StringLiteral) -> str:
-        return (
-            e.text.encode("latin-1", "backslashreplace").decode("unicode_escape")
-            if "\\" in e.text
-            else e.text
-        )
+        plain = "\\" not in e.text
+        return e.text if plain else e.text.encode("latin-1", "backslashreplace").decode("unicode_escape")
 
     def _mark(self, e: tree.Mark) -> Any:
         if e.word != "end" or self.end is None:
@@ -126,14 +125,18 @@ class Interpreter:
         return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
-        left = self.value(e.left)
-        if e.operator in ("and", "or") and left is (e.operator == "or"):
-            return left  # the other side may have no value
-        return operated(e.operator, [left, self.value(e.right)], self.library.call)
+        above = from_left(e)
+        found = self.value(above[0].left)
+        for one in above:
+            if one.operator not in ("and", "or") or found is not (one.operator == "or"):
+                found = operated(one.operator, [found, self.value(one.right)], self.library.call)
+        return found  # beside `or` and `and` the other side may have no value
 
     def _range(self, e: tree.RangeExpression) -> Any:
         start, stop = self.value(e.start), self.value(e.stop)
-        step = self.value(e.step) if e.step is not None else 1
+        if isinstance(start, EnumerationValue) and whole_name(e.start).endswith(f".{start.literal}"):
+            return self.value(tree.ComponentReference(e.at, cast(Any, e.start).parts[:-1]))[start - 1 : stop]
+        step = 1 if e.step is None else self.value(e.step)
         if not all(map(values.is_number, (start, stop, step))):
             raise ModelError("found a range of variables, expected one that is known at translation")
         count = int(np.floor((stop - start) / step + 1e-9)) + 1
@@ -328,10 +331,8 @@ class Interpreter:
         quiet = name == "noEvent" or (name == "smooth" and self.value(e.arguments[0]) > 0)
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
-            items = list(inner._iterated(e.arguments[0], e.iterators))
-            if name == "array":
-                return values.array(items)
-            return values.called(name, [np.ravel(values.array(items))], {})
+            found = values.array(list(inner._iterated(e.arguments[0], e.iterators)))
+            return found if name == "array" else values.called(name, [np.ravel(found)], {})
         if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
@@ -342,13 +343,16 @@ class Interpreter:
         if name == "getInstanceName":
             return self.members.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
+        if name == "pre" and before and (at := subscripts_at_end(e.arguments[0])):
+            whole = self.value(replace(e, arguments=at[:1]))
+            if any(map(self.varies, at[1], values.all_sizes(whole))):
+                return self.indexed(whole, at[1])  # their values now, of what was before
         if before and (found := self._before(name, e.arguments[0])) is not None:
             return found
         if before and (name_of := whole_name(e.arguments[0]).split(".")[0]) and self.members.has(name_of):
             inner = replace(inner, local={n: x for n, x in self.local.items() if n != name_of})
         name, function = called_function(e, self)
-        arguments = [inner.value(one) for one in e.arguments]
-        named = {key: inner.value(one) for key, one in e.named}
+        arguments, named = [*map(inner.value, e.arguments)], {key: inner.value(one) for key, one in e.named}
         if function is not None:
             return self.library.call(function, arguments, named, component_of(e, self) or self.members)
         if self.members.has(name):

@@ -1,6 +1,7 @@
 """Types of values and of expressions (Modelica 3.6, chapters 3.6 and 6.7), as far as the text tells them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.elaboration.values import RELATIONS, EnumerationValue
-from gantrytau.modelica.references import called_function
+from gantrytau.modelica.references import called_function, from_left
 
 BOOLEANS = frozenset({"edge", "change", "initial", "terminal", "sample"})
 INTEGERS = frozenset({"size", "ndims", "integer", "Integer", "cardinality"})
@@ -65,33 +66,50 @@ NOT_ENUMERATED = ("Real", "Boolean", "String")
 
 
 def _type_of_binary(e: tree.Binary, reader: Interpreter) -> str:
-    sign, sides = e.operator, (e.left, e.right)
+    above = from_left(e)
+    known = type_of(above[0].left, reader)
+    for one in above:
+        known = _type_of_sides(one, known, reader)
+    return known
+
+
+def _type_of_sides(e: tree.Binary, left: str, reader: Interpreter) -> str:
+    """The type of an operator's value, that of whose left side is known."""
+    sign, sides, known = e.operator, (e.left, e.right), {id(e.left): left}
     if sign in ("and", "or"):
-        _operands(sides, ("Boolean",), sign, reader)
+        _operands(sides, ("Boolean",), sign, reader, known)
         return "Boolean"
     if sign in RELATIONS:
-        _joined(sides, reader)
+        _joined(sides, reader, known)
         return "Boolean"
-    found = _operands(sides, (*NUMBERS, "String") if sign == "+" else NUMBERS, sign, reader)
+    found = _operands(sides, (*NUMBERS, "String") if sign == "+" else NUMBERS, sign, reader, known)
     if "" in found:
         return ""
     return "Real" if sign in ("/", "./", "^", ".^") or "Real" in found else found[0]
 
 
-def _operands(items: Iterable[Any], taken: tuple[str, ...], sign: str, reader: Interpreter) -> list[str]:
-    """The types of operands; TextError for one that the operator does not take."""
-    found = [(one, type_of(one, reader)) for one in items]
+def _operands(
+    items: Iterable[Any],
+    taken: tuple[str, ...],
+    sign: str,
+    reader: Interpreter,
+    known: Mapping[int, str] = MappingProxyType({}),
+) -> list[str]:
+    """The types of operands, by their ids where they are known; TextError for one that the operator does not take."""
+    found = [(one, known[id(one)] if id(one) in known else type_of(one, reader)) for one in items]
     for one, kind in found:
         if kind and kind not in taken:
             reader.scope.refuse(one.at, f"found {kind} beside '{sign}', expected {' or '.join(taken)}")
     return [kind for _, kind in found]
 
 
-def _joined(items: Iterable[Any], reader: Interpreter) -> str:
-    """The one type of several expressions; TextError for two that do not go together."""
+def _joined(
+    items: Iterable[Any], reader: Interpreter, known: Mapping[int, str] = MappingProxyType({})
+) -> str:
+    """The one type of several expressions, by their ids where known; TextError for two that do not go together."""
     found = ""
     for one in items:
-        kind = type_of(one, reader)
+        kind = known[id(one)] if id(one) in known else type_of(one, reader)
         if not (fits(found, kind) or fits(kind, found)):
             reader.scope.refuse(one.at, f"found {kind} beside {found}, expected one type")
         found = "Real" if "Real" in (found, kind) else kind or found

@@ -262,7 +262,12 @@ def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None
         return package_in(folder / name, around)
     if name != "package" and (file := folder / f"{name}.mo").is_file():
         found = read_tree(file)
-        return ClassScope(found.classes[0], found.source, around)
+        (definition, *others), within = found.classes, found.within or around.name
+        if around.name and (others or (definition.name, within) != (name, around.name)):
+            words = f"found '{found.within or ''}.{definition.name}' in the file {file.name} of {around.name}"
+            at = others[0].at if others else definition.at
+            raise ModelError(found.source.told(at, f"{words}, expected the one class {around.name}.{name}"))
+        return ClassScope(definition, found.source, around)
     if next((folder / name).glob("*.mo"), None) is not None:
         raise ModelError("found a folder without package.mo, expected one", place=str(folder / name))
     return None
@@ -270,7 +275,8 @@ def _in_folder(folder: Path, name: str, around: ClassScope) -> ClassScope | None
 
 def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassScope | None:
     for folder in folders:
-        versions = [p for p in sorted(folder.glob(f"{name} *"), reverse=True) if (p / "package.mo").is_file()]
+        versions = [p for p in folder.glob(f"{name} *") if (p / "package.mo").is_file()]
+        versions.sort(key=lambda p: [int(n) for n in re.findall(r"\d+", p.name)], reverse=True)
         for place in [folder / name] if (folder / name / "package.mo").is_file() else versions:
             return package_in(place, root)
         if (found := _in_folder(folder, name, root)) is not None:

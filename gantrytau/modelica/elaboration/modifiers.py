@@ -74,6 +74,10 @@ class Modifier:
         """The part of its value that indices and names of members choose."""
         for step in self.path:
             if isinstance(step, str):
+                known = value if isinstance(value, RecordValue) else getattr(value, "names", tuple)()
+                if step not in known:
+                    words = f"found a value without '{step}' for a record, expected one of its type, with all members"
+                    self.scope.refuse(self.at, words)
                 value = value[step] if isinstance(value, RecordValue) else value.member(step)
                 continue
             index, count = step

@@ -140,22 +140,30 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
             )
         if len(item.left.items) > len(right):
             raise ModelError(f"found {len(item.left.items)} outputs, expected at most {len(right)}")
-        pairs = [(reader.value(a), b) for a, b in zip(item.left.items, right, strict=False) if a is not None]
+        both = [(reader.value(a), b) for a, b in zip(item.left.items, right, strict=False) if a is not None]
     else:
-        pairs = [(reader.value(item.left), first_result(right))]
-    for a, b in pairs:
-        yield from _pairs(a, b)
+        both = [(reader.value(item.left), first_result(right))]
+    for a, b in both:
+        yield from pairs(a, b)
 
 
-def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
+def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
+    """Two values that are equal, as expressions of the language."""
     if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
         for one, other in zip(a, b, strict=True):
-            yield from _pairs(one, other)
+            yield from pairs(one, other)
         return
-    if hasattr(a, "member") or isinstance(a, values.RecordValue):
-        names: Iterable[str] = [*a] if isinstance(a, values.RecordValue) else cast(Members, a).names()
+    names, others = (_names(one) for one in (a, b))
+    if isinstance(a, list) or isinstance(b, list):
+        raise ModelError(
+            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
+        )
+    if (names is None) != (others is None) or not {*(names or ())} <= {*(others or ())}:
+        both = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
+        raise ModelError(f"found {both} beside '=', expected two of one type")
+    if names is not None:
         for name in names:
-            yield from _pairs(_member(a, name), _member(b, name))
+            yield from pairs(_member(a, name), _member(b, name))
         return
     if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
         raise ModelError(
@@ -175,6 +183,13 @@ def _pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         )  # not taken for a scalar beside a vector
     else:
         yield left, right
+
+
+def _names(value: Any) -> list[str] | None:
+    """The members of a record; None for what is no record."""
+    if isinstance(value, values.RecordValue):
+        return [*value]
+    return [*cast(Members, value).names()] if hasattr(value, "member") else None
 
 
 def _member(value: Any, name: str) -> Any:
@@ -202,6 +217,11 @@ def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
             raise ModelError(f"found connectors of the sizes {' and '.join(sizes)}, expected one size")
         for one, other in zip(a, b, strict=True):
             yield from _ends(one, other)
+        return
+    if values.size_words(a) != values.size_words(b):
+        words = " and ".join(map(values.size_words, (a, b)))
+        raise ModelError(f"found connectors of the sizes {words}, expected one size")
+    if 0 in values.all_sizes(a):
         return
     found = [getattr(x, "instance", None) if hasattr(x, "member") else values.to_casadi(x) for x in (a, b)]
     if any(x is None or isinstance(x, (bool, int, float, str)) for x in found):

@@ -4,6 +4,7 @@ A parameter that is asked for here shapes the model: its value is folded, and an
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -166,11 +167,11 @@ class Structure:
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
         here: Structure | None = self
-        for name, _ in reference.parts:
+        for k, (name, _) in enumerate(reference.parts, 1):
             one = here.members.get(name) if here is not None else None
             if one is None or one.primitive is not None:
                 return one
-            here = one.children[0] if one.children else None
+            here = one.sample if k < len(reference.parts) else None
         return None
 
 
@@ -339,6 +340,12 @@ class ClassMember:
             self.first_sizes.append(self._size(size, scope, k))
         return tuple(self.first_sizes)
 
+    @property
+    def sample(self) -> Structure | None:
+        """The structure of one of its elements; None without any, as where only a call of a function tells the sizes."""
+        with suppress(ModelError):
+            return next(iter(self.children), None)
+
     def _size(self, size: tree.Expression, scope: ClassScope, dimension: int) -> int:
         if isinstance(size, tree.Mark) and size.word == ":":
             if self.full.value is None:
@@ -372,7 +379,7 @@ class ClassMember:
             words = "which is partial, expected a class that extends it"
             scope.refuse(clause.at, f"found a component of {kind.name}, {words}")
         path = f"{self.owner.path}.{self.name}".lstrip(".")
-        prefixes = frozenset({"parameter", "constant"} & self.prefixes)
+        prefixes = frozenset({"parameter", "constant", "flow"} & self.prefixes)
         around: Structure | None = self.owner
         while around is not None and around.scope.definition is not kind.definition:
             around = around.around

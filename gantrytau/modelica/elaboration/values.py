@@ -127,7 +127,7 @@ def _shaped(value: Any) -> Any:
 
 def size_words(value: Any) -> str:
     """The size of a value as Modelica writes it."""
-    shape = np.shape(_shaped(value))
+    shape = all_sizes(value)
     return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
 
 
@@ -175,9 +175,14 @@ def _quotient(a: Any, b: Any) -> Any:
 
 
 def _power(a: Any, b: Any) -> Any:
-    if isinstance(a, np.ndarray) and isinstance(b, int):
-        return reduce(_product, [a] * b, np.eye(len(a), dtype=object))
-    return a**b
+    if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)):
+        return a**b
+    if len({*all_sizes(a)}) != 1 or np.ndim(a) != 2 or not isinstance(b, int) or b < 0:
+        words = (
+            f"found {sized(a)} and {sized(b)} beside '^', expected a square matrix and a known Integer from 0"
+        )
+        raise ModelError(f"{words}; '.^' takes the power of each element")
+    return reduce(_product, [a] * b, np.eye(len(a), dtype=object))
 
 
 ARITHMETIC: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -230,6 +235,8 @@ def condition(value: Any) -> Any:
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
     """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
+    if isinstance(then, list) and isinstance(otherwise, list):
+        return [chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)]
     if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
         a, b = record_value(then), record_value(otherwise)
         return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
@@ -273,6 +280,8 @@ def _size(value: Any, dimension: int | None = None) -> Any:
 
 
 def _filled(value: Any, *sizes: int) -> Any:
+    if not (is_plain(value) or value is None):
+        return [_filled(value, *sizes[1:]) if sizes[1:] else value] * sizes[0]
     found = np.empty(sizes, dtype=object)
     for place in np.ndindex(*sizes):
         found[place] = value
@@ -325,10 +334,10 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "floor": _elementwise(ca.floor),
     "ceil": _elementwise(ca.ceil),
     "integer": _elementwise(lambda x: ca.floor(x) if isinstance(x, ca.SX) else int(np.floor(x))),
-    "atan2": ca.atan2,
-    "mod": _of_numbers(operator.mod, mod),
-    "div": lambda x, y: _truncated(x / y),
-    "rem": lambda x, y: x - y * _truncated(x / y),
+    "atan2": _spread(ca.atan2),
+    "mod": _spread(_of_numbers(operator.mod, mod)),
+    "div": _spread(lambda x, y: _truncated(x / y)),
+    "rem": _spread(lambda x, y: x - y * _truncated(x / y)),
     "min": _reduced(_of_numbers(min, fmin), np.inf),
     "max": _reduced(_of_numbers(max, fmax), -np.inf),
     "sum": _reduced(operator.add, 0),

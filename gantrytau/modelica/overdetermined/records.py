@@ -20,6 +20,13 @@ def is_propagated(structure: Any) -> bool:
     return inside and is_overdetermined(structure)
 
 
+def is_connector(structure: Any) -> bool:
+    """Whether an instance is a connector, or a record in one that is connected member by member."""
+    around, kind = structure.around, structure.scope.definition.kind
+    inside = kind == "record" and around is not None and is_connector(around)
+    return kind == "connector" or (inside and not is_overdetermined(structure))
+
+
 def is_overdetermined(structure: Any) -> bool:
     """Whether an instance is a record with a function `equalityConstraint`."""
     scope = structure.scope
@@ -59,6 +66,8 @@ def closing(a: Any, b: Any, residual_of: Any) -> Iterator[tuple[str, str, Any, A
             found = "position", turn @ gap, turn @ der(gap)
         elif (structure := getattr(type(one), "structure", None)) and is_propagated(structure):
             residual = ca.SX(residual_of(structure, one, other))
+            if not residual.numel():
+                continue
             found = "orientation", residual, other.w - one.w if _is_orientation(one) else der(residual)
         else:
             continue

@@ -81,7 +81,7 @@ def _takes(function: ClassScope, operands: Sequence[Any], record: ClassScope) ->
 def _fits(taken: Element, operand: Any, record: ClassScope) -> bool:
     kind = _plain(taken.scope.find_class(taken.clause.type, taken.clause.at))
     dimensions = len(taken.declaration.subscripts) + len(taken.clause.subscripts)
-    given = 1 if isinstance(operand, list) else operand.ndim if isinstance(operand, np.ndarray) else 0
+    given = len(values.all_sizes(operand))
     same = (kind is not None and kind.definition is record.definition) == (
         operator_record(operand) is not None
     )

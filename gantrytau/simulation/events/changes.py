@@ -208,10 +208,10 @@ class Changes:
             if self._unsampled is not None and self._unsampled[0] == left:
                 _, trail.held[left], trail.z[left] = self._unsampled
             trail.show(left, k)
-            self._make(made, k, rose)
+            self._make(made, k)
         raise run_ends.endless_rounds(self.coordinates.dae, float(trail.t[k]), rounds.labels(rose))
 
-    def _make(self, made: Made, k: int, rose: np.ndarray) -> None:
+    def _make(self, made: Made, k: int) -> None:
         """Give a place the values of a round, and what follows from them."""
         coordinates, trail = self.coordinates, self.trail
         t, held = float(trail.t[k]), len(coordinates.held)

@@ -1,7 +1,9 @@
 """Robots that are led by hand while their tool touches something: Dressler (2012), chapter 8."""
 
+from gantrytau_models.leadthrough.adaptive_gain import AdaptiveForceControl
 from gantrytau_models.leadthrough.assumed import operators, surfaces
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
+from gantrytau_models.leadthrough.groove import Groove, GrooveLeadThrough, GrooveProjection, ToolInGroove
 from gantrytau_models.leadthrough.laws import (
     ContactState,
     Impedance,
@@ -28,10 +30,14 @@ from gantrytau_models.leadthrough.surface.surface_tracking import (
 )
 
 __all__ = [
+    "AdaptiveForceControl",
     "ContactLoop",
     "ContactState",
     "CriticalGain",
     "ForceSensor",
+    "Groove",
+    "GrooveLeadThrough",
+    "GrooveProjection",
     "Impedance",
     "LeadThrough",
     "LedArm",
@@ -50,6 +56,7 @@ __all__ = [
     "SurfaceRecord",
     "SurfaceTracking",
     "ToolForceControl",
+    "ToolInGroove",
     "VelocityServo",
     "contact_loop",
     "operators",

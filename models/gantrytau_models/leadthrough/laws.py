@@ -15,6 +15,7 @@ from gantrytau import (
     Output,
     Parameter,
     Real,
+    cross,
     dot,
     fabs,
     fmax,
@@ -63,11 +64,16 @@ class Impedance(Model):
 
 
 class ToolForceControl(Model):
-    """V_t = K (f_ref n - f), w_t = K_tau (0 - t): (8.4), which holds a force along n and none across it, and no torque."""
+    """V_t = K (f_ref n - f), w_t = K_tau (0 - t): (8.4), which holds a force along n and none across it, and no torque.
+
+    w_t + align z x n turns the tool until its axis z is the normal, as section 8.5 of the thesis wishes: it follows round
+    surfaces, behind by the angle of v / (radius align).
+    """
 
     K = Parameter([0.03] * 3, unit="m/(s.N)", min=0.0, description="velocity for a force, along each axis")
     K_tau = Parameter([0.0] * 3, unit="rad/(s.N.m)", min=0.0, description="angular velocity for a torque")
     f_ref = Parameter(2.0, unit="N", description="force along n")
+    align = Parameter(0.0, unit="1/s", min=0.0, description="angular velocity for an angle between z and n")
     f = Input(3, unit="N", start=0.0, description="force of the tool")
     t = Input(3, unit="N.m", start=0.0, description="torque of the tool")
     n = Input(3, unit="1", description="direction into the workpiece")
@@ -75,8 +81,11 @@ class ToolForceControl(Model):
     w = Output(3, unit="rad/s", description="angular velocity")
 
     def equations(self):
-        yield self.v == self.K * (self.f_ref * self.n - self.f)
-        yield self.w == -self.K_tau * self.t
+        yield self.v == self._gain() * (self.f_ref * self.n - self.f)
+        yield self.w == -self.K_tau * self.t + self.align * cross([0.0, 0.0, 1.0], self.n)
+
+    def _gain(self):
+        return self.K
 
 
 class ContactState(Model):

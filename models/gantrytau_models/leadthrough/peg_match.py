@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from gantrytau.border.checks import number
 
 
@@ -37,11 +35,6 @@ class Match:
     def bending(self) -> float:
         """Stiffness at the tip, 3 E I / length^3 with I = edge^4 / 12, N/m."""
         return self.modulus * self.edge**4 / (4 * self.length**3)
-
-    @property
-    def free_tilt(self) -> float:
-        """Tilt at which it touches at two points over the whole depth, 2 clearance / depth, rad."""
-        return float(np.arctan(2 * self.clearance / self.depth))
 
 
 WOODEN = Match()

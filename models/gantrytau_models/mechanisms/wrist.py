@@ -4,13 +4,21 @@ Dressler (2012), chapter 2, mentions such a wrist for the robots whose plate kee
 of it: all numbers here are assumed, of the size of a small spindle head.
 """
 
+from typing import Any
+
+import casadi as ca
 import numpy as np
 
 from gantrytau import Array, Input, Model, ModelError, Parameter, Real, StateSelect, connect, der
 from gantrytau.mechanics.multibody import Body, FixedTranslation, Revolute, TwoFrames
 from gantrytau.mechanics.rotational import Torque
-from gantrytau_models.mechanisms.f1 import F1GantryTau
+from gantrytau_models.mechanisms.f1 import F1GantryTau, Seat
 from gantrytau_models.mechanisms.six_link import Plate, SixLinkGantryTau
+
+
+def small_turn(tilt: Any) -> ca.SX:
+    """Unit quaternion, scalar first, of a turn by 2 atan(|tilt| / 2) about tilt (3,): a rotation vector in rad if small."""
+    return ca.vertcat(1, tilt / 2) / ca.sqrt(1 + ca.sumsqr(tilt) / 4)
 
 
 class WristJoint(TwoFrames):
@@ -21,6 +29,11 @@ class WristJoint(TwoFrames):
     )
     axis = Parameter(
         [0.0, 0.0, 1.0], unit="1", description="axis of rotation, resolved in frame_a", evaluate=True
+    )
+    tilt = Parameter(
+        [0.0, 0.0, 0.0],
+        unit="rad",
+        description="small turn of the whole joint against frame_a, resolved there",
     )
     m = Parameter(2.0, unit="kg", min=0.0, description="mass of what it turns")
     r_cm = Parameter([0.0, 0.0, 0.0], unit="m", description="centre of that mass, resolved in frame_b")
@@ -38,13 +51,15 @@ class WristJoint(TwoFrames):
     )
     tau = Input(unit="N.m", description="torque of the motor", start=0.0)
     arm = FixedTranslation(r=offset)
+    seat = Seat(orientation=lambda joint: small_turn(joint.tilt))
     joint = Revolute(n=axis, phi=dict(prefer=StateSelect.DEFAULT), w=dict(prefer=StateSelect.DEFAULT))
     body = Body(m=m, r_cm=r_cm, J=J)
     motor = Torque()
 
     def equations(self):
         yield connect(self.frame_a, self.arm.frame_a)
-        yield connect(self.arm.frame_b, self.joint.frame_a)
+        yield connect(self.arm.frame_b, self.seat.frame_a)
+        yield connect(self.seat.frame_b, self.joint.frame_a)
         yield connect(self.joint.frame_b, self.body.frame_a)
         yield connect(self.joint.frame_b, self.frame_b)
         yield connect(self.motor.flange, self.joint.axis)

@@ -204,6 +204,8 @@ def _keep(item: Item, session: Session, stem: Path) -> None:
         answer, values = session.run(item)
     except Exception as error:
         raise RuntimeError(f"{item.kind} {item.number}: the call fails with {error!r}") from error
+    if off := differences(item, values):
+        raise RuntimeError("\n".join(off))
     figures = list(answer) if isinstance(answer, list | tuple) else [answer]
     drawn = all(hasattr(figure, "savefig") for figure in figures)
     for k, figure in enumerate(figures if drawn else []):

@@ -32,6 +32,7 @@ from gantrytau_optimica.calibration.devices.cameras import (
 )
 from gantrytau_optimica.calibration.devices.devices import LaserTracker, TMac
 from gantrytau_optimica.calibration.devices.gauges import LengthGauge
+from gantrytau_optimica.calibration.devices.placement import Placement, place_device
 from gantrytau_optimica.calibration.devices.sampled_devices import SampledDevice
 from gantrytau_optimica.calibration.devices.sight import Bars
 from gantrytau_optimica.calibration.diagnostics.device_frames import frame_words
@@ -59,6 +60,7 @@ __all__ = [
     "Measurements",
     "ParameterRow",
     "PlacedCamera",
+    "Placement",
     "PoseSensitivities",
     "SampledDevice",
     "SensitivityTable",
@@ -77,6 +79,7 @@ __all__ = [
     "orientation_causes",
     "orientation_errors",
     "parameter_rows",
+    "place_device",
     "pose_sensitivities",
     "predict",
     "read_arms",

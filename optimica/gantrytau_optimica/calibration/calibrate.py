@@ -49,6 +49,7 @@ Frame = Literal["fitted", "base"]
 ON_RODS = dict(
     model=None, method="gauss-newton", start="nominal", orientation="local"
 )  # else robots on rods are meant
+BY_NAMES = dict(joints=None, tool="tool")  # else robots by names of parameters are meant
 
 
 @overload
@@ -75,6 +76,7 @@ def calibrate(
     *,
     parameters: Sequence[str],
     joints: Sequence[str] | None = ...,
+    tool: str = ...,
     prior: Mapping[str, Any] | None = ...,
     loss: Loss = ...,
     holdout: Any = ...,
@@ -98,6 +100,7 @@ def calibrate(
     frame: Frame = "fitted",
     parameters: Sequence[str] | None = None,
     joints: Sequence[str] | None = None,
+    tool: str = "tool",
 ) -> Calibration | NamedCalibration:
     """Identify the kinematic parameters of a robot from measured poses: on rods by the closure of its links, of any robot
     with a tool and driven joints by the names of its parameters.
@@ -114,7 +117,8 @@ def calibrate(
     frame: "base" says that poses were measured in the base of the robot, where it is commanded; "fitted" takes them in any
     frame: numbers are identified there, and nominal values say where the base is, `.parameters["frame.R"]`, `["frame.t"]`.
     parameters: names in the model of any robot, as ["upper.r", "h"]; prior, loss, holdout and frame speak of them, and the
-    frame is fitted beside them. joints: columns of q, by default those that are driven.
+    frame is fitted beside them. joints: columns of q, by default those that are driven. tool: name of the
+    component that was measured, its `.r` and `.R`, as "wrist".
     Raises ModelError for what the model lacks; CalibrationError, with `.rows` and `.kind`, for hopeless measurements.
     """
     asked = locals()
@@ -122,7 +126,7 @@ def calibrate(
     instance("calibrate", "measurements", measurements, Measurements, "Measurements(q, r, ...)")
     _check_rods(asked)
     if parameters is not None:
-        known = usable(robot, measurements, parameters, joints)
+        known = usable(robot, measurements, parameters, joints, tool)
         split = _split(known.rows, holdout, measurements)
         return calibrate_by_names(robot, measurements, known, split, prior=prior, loss=loss, frame=frame)
     fit = _Asked(model, start, prior, loss, orientation, frame)
@@ -223,13 +227,24 @@ def _needs_values(prior: Mapping[str, Any] | None) -> bool:
 
 
 def _check_rods(asked: Mapping[str, Any]) -> None:
-    """ModelError for arguments that speak of robots on rods beside parameters=, and constraints that are not kept."""
+    """ModelError for arguments that speak of robots on rods beside parameters=, or of names without, and constraints that
+    are not kept.
+    """
     for name, usual in ON_RODS.items() if asked["parameters"] is not None else ():
         if asked[name] != usual:
             raise ModelError(
                 f"expected {usual!r} with ",
                 Given("parameters"),
                 ": it speaks of robots on rods",
+                place="calibrate",
+                found=Given(name, asked[name]),
+            )
+    for name in BY_NAMES if asked["parameters"] is None else ():
+        if asked[name] != BY_NAMES[name]:
+            raise ModelError(
+                "expected it with ",
+                Given("parameters"),
+                " alone",
                 place="calibrate",
                 found=Given(name, asked[name]),
             )

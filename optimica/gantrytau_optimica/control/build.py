@@ -55,7 +55,7 @@ def build(
     open_names = {n.name for n in chosen}
     numbers = {n: dae.parameter_values[n] for n in dae.adjustable if n not in open_names}
     rates = input_rates(read, [*system.to_system(_statements(read)), system.ode, system.residuals])
-    check_pieces(read, rates, controls or {})
+    check_pieces(rates, controls or {})
     conditions = (start_conditions(dae), link_conditions(read, rates))
     points = (*read.points, *(p for more, _ in conditions for p in more))
     constraints = (*read.constraints, *(c for _, more in conditions for c in more))

@@ -50,7 +50,7 @@ def lifted(name: str, symbol: ca.SX, rates: Rates) -> tuple[list[tuple[str, ca.S
     return states, derivative_name(name, len(states)), chain[-1]
 
 
-def check_pieces(read: SymbolicProblem, rates: Rates, controls: Mapping[str, Pieces]) -> None:
+def check_pieces(rates: Rates, controls: Mapping[str, Pieces]) -> None:
     """ModelError for pieces of an input that follows from its rate, or of a rate that is not chosen."""
     for name in controls:
         base, order = split_derivative(name)

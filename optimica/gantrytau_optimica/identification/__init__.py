@@ -2,6 +2,7 @@
 
 from gantrytau_optimica.identification.excitation.design_excitation import design_excitation
 from gantrytau_optimica.identification.excitation.excitation_result import Excitation
+from gantrytau_optimica.identification.friction.friction_map import FrictionMap, friction_over_load
 from gantrytau_optimica.identification.friction.friction_result import Friction
 from gantrytau_optimica.identification.friction.identify_friction import identify_friction
 from gantrytau_optimica.identification.logs.motion_log import MotionLog
@@ -30,6 +31,7 @@ __all__ = [
     "TABLE_6_3",
     "Excitation",
     "Friction",
+    "FrictionMap",
     "Identification",
     "IdentificationError",
     "IdentifiedSystem",
@@ -43,6 +45,7 @@ __all__ = [
     "check_motion",
     "compare_models",
     "design_excitation",
+    "friction_over_load",
     "identify",
     "identify_friction",
     "identify_servo",

@@ -149,15 +149,19 @@ class Rig:
                 argument="stiff",
             ) from None
 
-    def at_rest(self, q: ArrayLike) -> tuple[Dae, dict[str, float]]:
+    def at_rest(self, q: ArrayLike, seed: int | None = None) -> tuple[Dae, dict[str, float]]:
         """The robot under its servos as it rests with its joints at q (n,), and the inputs that hold it there.
 
-        To be exported as an FMU: `export_fmu(loop, "rig.fmu")`, with q_ref and v_ref as inputs; friction is at its nominal
-        level, and nothing pushes. Raises ModelError for another shape, InitializationError where it cannot rest.
+        To be exported as an FMU, `export_fmu(loop, "rig.fmu")`, or run by an Mpc, `Controller(loop, period=rig.period,
+        starts=inputs)`, with q_ref and v_ref as inputs; nothing pushes. Friction is that of `run` with a seed, or at its
+        nominal level. Raises ModelError for another shape, InitializationError where it cannot rest.
         """
         found = array("Rig.at_rest", "q", q, (len(self.joints),))
         loop, forces = self._at_rest(found)
         still = {name: 0.0 for name in loop.inputs if name.startswith("push.")}
+        if seed is not None:
+            whole("Rig.at_rest", "seed", seed, least=0)
+            return loop, still | self._drawn(forces, np.random.default_rng(seed))
         for law in self._laws:
             if law is not None:
                 still |= {f"robot.{law}.level": 1.0, f"robot.{law}.z_0": 0.0}

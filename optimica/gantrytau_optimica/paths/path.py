@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from gantrytau import Model, ModelError, Real, StateSelect, der
-from gantrytau.border.checks import array, instance, number
-from gantrytau.border.refusal import USERS_ERRORS, Given
+from gantrytau import ModelError
+from gantrytau.border.checks import array, number
+from gantrytau.border.refusal import USERS_ERRORS
 from gantrytau.describing.record import Record
 from gantrytau.language.declarations import Formula
 from gantrytau.whole_files import replacing
@@ -368,27 +368,3 @@ def _picked(u: ca.SX, knots: Array, values: Array) -> list[ca.SX]:
         behind = u >= knot
         found = [f if j == 0.0 else f + ca.if_else(behind, j, 0) for f, j in zip(found, jumps, strict=True)]
     return found
-
-
-class Way(Model):
-    """A point that moves along a path, whose way s is the state.
-
-    path: a Path; further keywords modify members: v=Bounds(-0.5, 0.5), a=Bounds(-2.0, 2.0) limit speed and acceleration
-    along it. s has its limits at the ends of the path.
-    """
-
-    s = Real(unit="m", description="way along the path", prefer=StateSelect.ALWAYS)
-    v = Real(unit="m/s", description="speed along the path", prefer=StateSelect.ALWAYS, start=0.0)
-    a = Real(unit="m/s2", description="acceleration along the path")
-    r = Real(3, unit="m", description="place, resolved as the path's points are")
-
-    def __init__(self, path: Path, **modifications: Any):
-        self.path = instance("Way", "path", path, Path, "a Path in space; make one with Path.through(points)")
-        if path.dimension != 3:
-            raise ModelError("expected a Path in space", place="Way", found=Given("path", path))
-        super().__init__(dict(s=dict(start=path.length / 2, min=0.0, max=path.length)), **modifications)
-
-    def equations(self):
-        yield self.r == self.path(self.s)
-        yield self.v == der(self.s)
-        yield self.a == der(self.v)

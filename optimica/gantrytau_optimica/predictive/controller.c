@@ -490,33 +490,46 @@ static int mpc_later(controller_state *it, double *x, double t) {
     return change < 1e-10;
 }
 
-/* One iteration of Gauss and Newton from state x at time t; the largest change of an input, below 0 without solution.
- * near: only if the plan is nearly a motion of the model; see PlannedMotion.near. */
-static double mpc_iterate(controller_state *it, const double *x, double t, int near) {
+/* The horizon from time t linearised at the plan, its program loaded; 0 where equations are singular. */
+static int mpc_load(controller_state *it, double t) {
     mpc_work *work = &it->work;
-    double first[NQ] = {0}, o[NU], change = 0, off = 0, size = 0, begin = 0, given = 0, all = 0;
-    int i, j, k, m;
+    double o[NU];
+    int i, j, k;
     FOR(k, N) {
         FOR(i, NU) o[i] = (k ? it->plan.u[k - 1][i] : it->applied[i]) - it->plan.u[k][i];
-        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, it->known, &work->linear)) return -1;
+        if (!mpc_linearise(it->plan.x[k], it->plan.w[k], it->plan.u[k], t + k * MPC_PERIOD, it->known, &work->linear)) return 0;
         FOR(i, NW) FOR(j, 1 + NV) work->unknowns[k][i][j] = work->linear.T[i / (NX + NZ)][i % (NX + NZ)][j];
         mpc_assemble(&work->stages[k], k, &work->linear, it->plan.w[k] + NX + NZ, it->plan.x[k + 1], it->plan.u[k], o);
     }
-    FOR(k, N) FOR(i, NW) off = fmax(off, fabs(work->unknowns[k][i][0])), size = fmax(size, fabs(it->plan.w[k][i]));
-    FOR(i, NX) begin = fmax(begin, fabs(it->plan.x[0][i])), given = fmax(given, fabs(x[i]));
-    if (near && !(off < 1 + size && begin < MPC_APART * (1 + given))) return -1;
     memset(work->end_P, 0, sizeof work->end_P), memset(work->end_p, 0, sizeof work->end_p);
     FOR(i, NX) FOR(j, NX) {
         work->end_P[i][j] = mpc_rest_P[i][j];
         work->end_p[i] += mpc_rest_P[i][j] * (it->plan.x[N][j] - mpc_rest_x[j]);
     }
+    return 1;
+}
+
+/* Whether a loaded plan can go on from state x; see PlannedMotion.near. */
+static int mpc_near(const controller_state *it, const double *x) {
+    double off = 0, size = 0, begin = 0, given = 0;
+    int i, k;
+    FOR(k, N) FOR(i, NW) off = fmax(off, fabs(it->work.unknowns[k][i][0])), size = fmax(size, fabs(it->plan.w[k][i]));
+    FOR(i, NX) begin = fmax(begin, fabs(it->plan.x[0][i])), given = fmax(given, fabs(x[i]));
+    return off < 1 + size && begin < MPC_APART * (1 + given);
+}
+
+/* The plan changed by the solution of the loaded program from state x; the largest change of an input or state, below 0 without solution. */
+static double mpc_change(controller_state *it, const double *x) {
+    mpc_work *work = &it->work;
+    double first[NQ] = {0}, change = 0, all = 0;
+    int i, j, k, m;
     FOR(i, NX) first[i] = x[i] - it->plan.x[0][i];
     if (!mpc_program(work, first)) return -1;
     for (k = N - 1; k >= 0; k--) {
         const mpc_stage *s = &work->stages[k];
         double by[1 + NV];
         by[0] = 1;
-        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i];
+        FOR(i, NX) by[1 + i] = s->v[i], it->plan.x[k][i] += s->v[i], change = fmax(change, fabs(s->v[i]));
         FOR(i, NU) {
             const double before = k ? it->plan.u[k - 1][i] : it->applied[i];
             by[1 + NX + i] = mpc_chosen[k] ? s->v[NQ + i] : s->v[NX + i] + before - it->plan.u[k][i];
@@ -525,7 +538,7 @@ static double mpc_iterate(controller_state *it, const double *x, double t, int n
         FOR(m, NW) FOR(j, 1 + NV) it->plan.w[k][m] += work->unknowns[k][m][j] * by[j];
         FOR(i, NU) it->plan.u[k][i] += by[1 + NX + i];
     }
-    FOR(i, NX) it->plan.x[N][i] += work->end_v[i];
+    FOR(i, NX) it->plan.x[N][i] += work->end_v[i], change = fmax(change, fabs(work->end_v[i]));
     FOR(k, N) {
         FOR(i, NW) all += 0 * it->plan.w[k][i];
         FOR(i, NU) all += 0 * it->plan.u[k][i];
@@ -564,7 +577,7 @@ void controller_step(controller_state *state, const controller_real *given, cont
     if (solved) for (on = begun, change = -1; change < 0 && on >= 0; on--) {
         if (begun && !on) mpc_guess(it, x); /* the plan before leads nowhere: a first one */
         FOR(turn, on ? MPC_ITERATIONS : MPC_FIRST) {
-            change = mpc_iterate(it, x, t, on && !turn);
+            change = mpc_load(it, t) && (turn || !on || mpc_near(it, x)) ? mpc_change(it, x) : -1;
             if (change < MPC_STANDS) break;
         }
     }

@@ -2,8 +2,6 @@
 
 import math
 import warnings
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +10,6 @@ from gantrytau.border.refusal import DoubtfulResult
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.predictive.plan import PlannedMotion
 from gantrytau_optimica.predictive.stages import HorizonStages
-from gantrytau_optimica.predictive.unknowns import as_courses, with_unknowns
 
 ENDLESS = 1e6  # sizes of an input: nothing that an objective bounds
 SURE = 5  # late steps, without one in time, until a deadline is doubted
@@ -72,29 +69,3 @@ def doubt_deadline(name: str, deadline: float, steps: list[float], missed: int) 
             DoubtfulResult,
             stacklevel=3,
         )
-
-
-def staged(
-    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
-) -> tuple[Built, HorizonStages, dict[str, float]]:
-    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
-    horizon can have.
-    """
-    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
-    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
-    read, found = built.read, built.problem
-    if found.free:
-        names = ", ".join(n.name for n in found.free)
-        raise ModelError(
-            f"{names} is free, expected a number: a receding horizon has a fixed length and a fixed model; give it a value, "
-            "as in final_time = 1.0",
-            place=read.name,
-        )
-    if not all(phase.inputs and phase.states for phase in found.phases):
-        words = (
-            "there is no input to choose; declare one as Input"
-            if found.phases[0].states
-            else "there is no state"
-        )
-        raise ModelError(words, place=read.name)
-    return built, HorizonStages(found, period), estimates

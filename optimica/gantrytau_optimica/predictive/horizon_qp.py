@@ -40,13 +40,16 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), and whether the program was solved, or has no bound."""
+    """Changes of states (N + 1, nx) and inputs (N, nu), slacks (N,), whether the program was solved or has no bound, and its
+    objective.
+    """
 
     x: np.ndarray
     u: np.ndarray
     slack: np.ndarray
     solved: bool
     unbounded: bool = False
+    objective: float = 0.0
 
 
 class HorizonProgram:
@@ -150,6 +153,7 @@ class HorizonProgram:
             parts[:, -1] if self.slack else np.zeros(n),
             bool(status == piqp.Status.PIQP_SOLVED and np.isfinite(v).all()),
             status == piqp.Status.PIQP_DUAL_INFEASIBLE,
+            self._solver.result.info.primal_obj,
         )
 
 

@@ -16,9 +16,14 @@ from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.predictive import horizon_checks as checks
 from gantrytau_optimica.predictive.c_code import controller_code
-from gantrytau_optimica.predictive.closed_loop import PARTS, ClosedLoop, closed_loop
+from gantrytau_optimica.predictive.compiled_horizon import compiled_horizon
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
-from gantrytau_optimica.predictive.horizon_qp import Found, HorizonProgram, Stage
+from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iterated, Loaded, failed
+from gantrytau_optimica.predictive.loop.closed_loop import ClosedLoop
+from gantrytau_optimica.predictive.loop.driven_loop import driven_loop
+from gantrytau_optimica.predictive.loop.model_loop import PARTS, model_loop
+from gantrytau_optimica.predictive.loop.plant import DrivenPlant, check_problem
+from gantrytau_optimica.predictive.loop.sensors import Sensors
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
@@ -27,13 +32,12 @@ from gantrytau_optimica.predictive.plan import (
     guessed_plan,
     motion_result,
 )
-from gantrytau_optimica.predictive.stages import HorizonStages, Linear
-from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
-from gantrytau_optimica.predictive.unknowns import named_values
+from gantrytau_optimica.predictive.stages import HorizonStages
+from gantrytau_optimica.predictive.terminal import SteadyState
+from gantrytau_optimica.predictive.unknowns import named_values, staged
 from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
-STANDS = 1e-6  # changes of scaled inputs by which iterations are done; flat parts of a program are not solved better
 PENALTY = 1e3  # times the largest curvature of the objective
 PASSED = 1e-6  # of the size of a limit: less is rounding
 MOST = 50  # iterations of the first plan, and of `converged`
@@ -93,34 +97,25 @@ class Mpc:
             one_of("Mpc", "terminal", terminal, ("lqr",))
         if penalty is not None:
             penalty = number("Mpc", "penalty", penalty, above=0.0)
-        self.built, self.stages, self._estimates = checks.staged(
-            problem, self.period, disturbance, parameters
-        )
+        self.built, self.stages, self._estimates = staged(problem, self.period, disturbance, parameters)
         self._modelled = dict(self._estimates)  # those of the model
         self.name = self.built.read.name
         checks.check_bounded(self.stages)
         checks.doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self.stages.curvature if penalty is None else penalty
-        finite = np.isfinite(self.stages.rows)
         self.moves = moves = Moves(self.stages, self.elements, rates or {}, step_penalty or {}, blocks)
-        nx = self.stages.nx + (self.stages.nu if moves.wanted else 0)
-        limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
-        soft, finite = np.append(soft, limits[0] & False), np.hstack([finite, limits])
-        self._penalty = weight
-        size = self.stages.curvature
-        self._program = HorizonProgram(self.elements, nx, self.stages.nu, soft, finite, weight, size=size)
-        self.terminal = Terminal(self.stages)
         self.steady = SteadyState(self.stages) if terminal == "lqr" else None
+        self._newton = GaussNewton(self.stages, self.elements, soft, weight, moves, self.steady)
+        self.terminal, self._penalty = self._newton.terminal, weight
         self._guess = guess
         self._plan: PlannedMotion | None = None
-        self._prepared: tuple[PlannedMotion, Linear | None] | None = None
+        self._prepared: tuple[PlannedMotion, Loaded | None] | None = None
         self._preparations: list[float] = []
         self._steps: list[float] = []
         self._missed = 0
         self.status: Status | None = None
         self.softened: tuple[str, ...] = ()  # limits that the last plan passes
-        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
 
     def __repr__(self) -> str:
         counts = f"{self.stages.nx} states, {self.stages.nu} inputs"
@@ -166,20 +161,23 @@ class Mpc:
             x, reached = self._later(x, t)
             t += self.period
         before = self._plan
-        plan, solved, change = self._iterated(x, t) if reached else (self._first(x, t), False, math.inf)
+        found, near = self._iterated(x, t) if reached else (failed(self._first(x, t)), False)
         late = before is not None and time.perf_counter() - begin > self.deadline
-        kept = plan if before is None else before.shifted(t, self.period)
-        self._plan = plan if solved else None if before is None else kept
-        held = kept.u[0] if late or not solved else plan.u[0]
-        held = self.moves.reached(held, self._applied)
-        self._applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
+        kept = found.plan
+        if before is not None and (late or not found.solved):
+            kept = before.shifted(t, self.period)
+        self._plan = found.plan if found.solved else None if before is None else kept
+        held = kept.u[0]
+        held = self.moves.reached(held, self._newton.applied)
+        self._newton.applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
         self._missed += late
-        wanting = self._converged and change >= STANDS
+        if found.solved:
+            self.softened = self._passed(found.slack, found.plan)
         words: dict[Status, bool] = {
-            "failed": not solved,
+            "failed": not found.solved,
             "late": late,
             "lost": lost,
-            "not converged": wanting,
+            "not converged": not near,
             "solved": True,
         }
         self.status = next(word for word, holds in words.items() if holds)
@@ -187,123 +185,108 @@ class Mpc:
         checks.doubt_deadline(self.name, self.deadline, self._steps, self._missed)
         return self.held
 
-    def _iterated(self, x: np.ndarray, t: float) -> tuple[PlannedMotion, bool, float]:
-        """The plan from a state (nx,), whether its programs were solved, and the last change of its inputs.
+    def _iterated(self, x: np.ndarray, t: float) -> tuple[Iterated, bool]:
+        """The plan from a state (nx,), and whether it is as near to converged as wanted.
 
-        A plan that cannot go on, or is no motion of the model, is made anew as the first one.
+        A plan that cannot go on, or is no motion of the model, is made anew as the first one, without Ipopt.
         """
         prepared, self._prepared = self._prepared, None
         if self._plan is not None:
             if prepared is not None and abs(prepared[0].t - t) < 1e-9 * self.period:
-                plan, linear = prepared
+                plan, loaded = prepared
             else:
                 plan = self._plan.shifted(t, self.period)
-                linear = self._linear(plan)
-            near = linear is not None and plan.near(linear, x)
-            if near and (found := self._improved(plan, linear, x, self.iterations))[1]:
-                return found
-        return self._improved(first := self._first(x, t), self._linear(first), x, MOST)
+                loaded = self._newton.load(plan)
+            near = loaded is not None and plan.near(loaded.missed, x)
+            if near and (found := self._newton.improved(plan, loaded, x, self.iterations)).solved:
+                return found, found.stands or not self._converged
+        found = self._begun(self._first(x, t), x)
+        return found, found.stands or (found.near and not self._converged)
 
-    def _improved(
-        self, plan: PlannedMotion, linear: Linear | None, x: np.ndarray, most: int
-    ) -> tuple[PlannedMotion, bool, float]:
-        """A plan after at most so many iterations, as `_iterated`; linear: at the plan, its program loaded."""
-        first, change = self._plan is None, math.inf
-        for k in range(most):
-            linear = self._linear(plan) if k else linear
-            if linear is None:
-                return plan, False, change
-            found = self._solved(plan, x)
-            if first and found.unbounded:
-                checks.check_plan(self.stages, plan, True)
-            if not found.solved:
-                return plan, False, change
-            plan, change = plan.changed(linear, found), float(np.abs(found.u).max(initial=0.0))
-            self.softened = self._passed(found.slack, plan)
-            if change < STANDS:
-                break
-        if first:
-            checks.check_plan(self.stages, plan, False)
-        return plan, True, change
+    def _begun(self, first: PlannedMotion, x: np.ndarray) -> Iterated:
+        """The plan from a first one."""
+        initial = self._plan is None
+        found = self._newton.begun(first, x, MOST, initial)
+        if initial and (found.solved or found.unbounded):
+            checks.check_plan(self.stages, found.plan, found.unbounded)
+        return found
 
     def prepare(self) -> None:
         """What can be done before the next measurement: the plan shifted by a period, linearised, its program loaded."""
         begin = time.perf_counter()
         if self._plan is not None:
             plan = self._plan.shifted(self._plan.t + self.period, self.period)
-            self._prepared = plan, self._linear(plan)
+            self._prepared = plan, self._newton.load(plan)
         self._preparations.append(time.perf_counter() - begin)
 
-    def _linear(self, plan: PlannedMotion) -> Linear | None:
-        """The horizon linearised at a plan, its program loaded; None where a number is not finite."""
-        stages, times = self.stages, plan.t + self.period * np.arange(self.elements)
-        linear = stages.finite(plan.x[:-1], plan.w, plan.u, times)
-        if linear is None:
-            return None
-        (lower, upper), (H, g) = stages.rows, self.terminal.added(linear, plan)
-        P, p = np.zeros((stages.nx, stages.nx)), np.zeros(stages.nx)
-        if self.steady is not None:
-            P, rest = self.steady.at(plan.t + self.elements * self.period, plan.x[-1])
-            p = P @ (plan.x[-1] - rest)
-        stage = Stage(
-            H, g, linear.A, linear.B, linear.b - plan.x[1:], linear.C, linear.D, lower - linear.r, upper - linear.r,
-            stages.lower_u - plan.u, stages.upper_u - plan.u,
-        )  # fmt: skip
-        if self.moves.wanted:
-            stage = self.moves.added(stage, plan.u, self._applied)
-            P, p = np.pad(P, (0, stages.nu)), np.append(p, np.zeros(stages.nu))
-        self._program.load(stage, P, p)
-        return linear
-
-    def _solved(self, plan: PlannedMotion, x: np.ndarray) -> Found:
-        """What the loaded program says from a state (nx,)."""
-        first, added = x - plan.x[0], self.moves.wanted
-        found = self._program.solve(np.append(first, np.zeros(self.stages.nu)) if added else first)
-        return self.moves.removed(found, plan.u, self._applied) if added else found
-
     def compiled(self) -> bool:
-        """Wait until the model is machine code, which a long run has made beside it; False without a C compiler."""
+        """Wait until the controller is machine code; False without a C compiler.
+
+        The model becomes that in a long run anyway; the quadratic program only here, and where `c_code` can be had.
+        """
+        with suppress(ModelError):
+            self._newton.code = compiled_horizon(self.c_code(), self.stages, self.elements)
         return self.stages.compiled()
 
     def reset(self) -> None:
         """Forget the plan and the estimates: the next step makes a first one."""
         self._plan = self._prepared = None
         self._estimates |= self._modelled
-        self._applied = np.clip(np.zeros(self.stages.nu), self.stages.lower_u, self.stages.upper_u)
+        self._newton.reset()
 
     def run(
         self,
-        plant: Optimization | type[Optimization] | None = None,
+        plant: Optimization | type[Optimization] | DrivenPlant | None = None,
         *,
         stop: float,
         start: Mapping[str, Any] | None = None,
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
         estimator: StateEstimator | None = None,
+        after: ClosedLoop | None = None,
+        wires: Mapping[str, str] | None = None,
     ) -> ClosedLoop:
         """The loop closed with a plant, from a new plan on.
 
-        plant: the same problem with other parameters, by default with the same; stop: s; start: state -> value, by default
-        the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator: a MovingHorizon or
-        an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by these names.
+        plant: the same problem with other parameters, by default with the same, or a `Controller` of gantrytau_fmu, which
+        runs an FMU, any model or hardware from its own start; wires: input or state -> name in it. stop: s; start: state ->
+        value, by default the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator:
+        a MovingHorizon or an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by
+        these names.
+        after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
         """
-        if estimator is not None:
-            instance("run", "estimator", estimator, StateEstimator, "a MovingHorizon or an ExtendedKalman")
+        sensors = Sensors(self, noise or {}, seed, estimator)
         self.reset()
         self._preparations, self._steps, self._missed = [], [], 0
         step = self.period / PARTS
-        other = (
-            checks.staged(plant, step)[:2]
-            if plant is not None
-            else (self.built, HorizonStages(self.built.problem, step))
-        )
-        return closed_loop(self, other, stop, start or {}, noise or {}, seed, estimator)
+        if isinstance(plant, DrivenPlant):
+            return driven_loop(self, plant, stop, sensors, wires, start or after)
+        check_problem(plant, wires)
+        own = plant is None
+        other = (self.built, HorizonStages(self.built.problem, step)) if own else staged(plant, step)[:2]
+        return model_loop(self, other, stop, start or {}, sensors, after)
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What a loop must have in common with this controller to go on with it."""
+        return self.states, self.inputs, self.period, self.elements, self.delay
+
+    def resume(self, plan: PlannedMotion, applied: Mapping[str, float], times: StepTimes) -> None:
+        """Be as after the step that made a plan, with these inputs held."""
+        self._plan, self._prepared = plan, None
+        self._newton.applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
+        self._preparations, self._steps = list(times.preparation), list(times.step)
+        self._missed = times.missed
+
+    def planned_motion(self, x: np.ndarray, t: float) -> PlannedMotion:
+        """The plan of the last step; where there is none, rest in a state (nx,) in its units from t on."""
+        return self._first(x / self.stages.sizes_x, t) if self._plan is None else self._plan
 
     def c_code(self) -> SampledCode:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
         It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
-        foretold, or kept.
+        foretold, or kept; first plans are not made by Ipopt.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
@@ -313,7 +296,7 @@ class Mpc:
     @property
     def held(self) -> dict[str, float]:
         """The inputs that are applied now, by name."""
-        return dict(zip(self.inputs, (self._applied * self.stages.sizes_u).tolist(), strict=True))
+        return dict(zip(self.inputs, (self._newton.applied * self.stages.sizes_u).tolist(), strict=True))
 
     def whole_state(self, values: Mapping[str, Any]) -> np.ndarray:
         """All states in their units, in the order of `states`; errors of `step`."""
@@ -354,7 +337,7 @@ class Mpc:
         still[:, :nx] = x
         for begin in (still.ravel(), known.w[0], plan.w[0]):
             with suppress(ModelError):
-                return self.stages.moved(x, begin, self._applied, t)[self.stages.last], True
+                return self.stages.moved(x, begin, self._newton.applied, t)[self.stages.last], True
         return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:

@@ -59,19 +59,22 @@ class PlannedMotion:
     u: np.ndarray
     t: float
 
-    def changed(self, linear: Linear, found: Found) -> "PlannedMotion":
-        """The plan after a step of Gauss-Newton's method."""
+    def changed(self, linear: Linear, found: Found, share: float = 1.0) -> "PlannedMotion":
+        """The plan after a step of Gauss-Newton's method, or a share of it."""
         v = np.concatenate([np.ones((len(self.u), 1)), found.x[:-1], found.u], axis=1)
-        w = self.w + np.einsum("nij,nj->ni", linear.w, v)
-        return PlannedMotion(self.x + found.x, w, self.u + found.u, self.t)
+        w = self.w + share * np.einsum("nij,nj->ni", linear.w, v)
+        return PlannedMotion(self.x + share * found.x, w, self.u + share * found.u, self.t)
 
-    def near(self, linear: Linear, x: np.ndarray) -> bool:
-        """Whether it can go on from a state (nx,), linearised: its unknowns nearly solve their equations, beside what they
-        are, and it begins not far beyond the state.
+    def without_stages(self) -> "PlannedMotion":
+        """The plan with the unknowns of its last stage alone, to be kept."""
+        return replace(self, w=self.w[-1:].copy())
+
+    def near(self, missed: float, x: np.ndarray) -> bool:
+        """Whether it can go on from a state (nx,): its unknowns miss their equations by little, beside what they are, and it
+        begins not far beyond the state.
         """
         begin, given = (np.abs(one).max(initial=0.0) for one in (self.x[0], x))
-        off = np.abs(linear.w[:, :, 0]).max(initial=0.0)
-        return bool(off < 1.0 + np.abs(self.w).max(initial=0.0) and begin < APART * (1.0 + given))
+        return bool(missed < 1.0 + np.abs(self.w).max(initial=0.0) and begin < APART * (1.0 + given))
 
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""
@@ -117,9 +120,16 @@ def guessed_plan(
 
 
 def motion_result(
-    built: Built, stages: HorizonStages, motion: PlannedMotion, period: float, title: str
+    built: Built,
+    stages: HorizonStages,
+    motion: PlannedMotion,
+    period: float,
+    title: str,
+    ahead: float = 0.0,
+    told: Mapping[str, np.ndarray] | None = None,
 ) -> Result:
-    """All variables of a model at the samples of a motion, its inputs held.
+    """All variables of a model at the samples of a motion, its inputs held; those of `ahead` s later than each sample.
+    told: variables that are known from elsewhere.
 
     Algebraic variables are those at the end of the period before, with its inputs.
     """
@@ -133,8 +143,9 @@ def motion_result(
     symbols = [ca.vertcat(*(s.symbol for s in phase.signals)), stages.problem.time]
     symbols.append(ca.vertcat(ca.SX(0, 1), *(c.symbol for c in phase.courses)))
     named = ca.Function("variables", symbols, [ca.densify(built.expressed(names))])
-    values = np.asarray(named(signals.T, times[None, :], stages.course_values(times)))
+    later = times + ahead
+    values = np.asarray(named(signals.T, later[None, :], stages.course_values(later)))
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
     own["held"] = [s.name for s in phase.inputs]
-    return Result(times, dict(zip(names, values, strict=True)), **own)
+    return Result(times, dict(zip(names, values, strict=True)) | dict(told or {}), **own)

@@ -121,6 +121,14 @@ class HorizonStages:
         return ca.vertcat(slopes, self.at_point(phase.residuals) / ca.DM(sizes))
 
     @cached_property
+    def limits(self) -> ca.SX:
+        """Limited expressions along the path, each by its size, (path,)."""
+        if not self.path:
+            return ca.SX(0, 1)
+        column = ca.vertcat(*(limit.expression for limit in self.path))
+        return self.at_point(column) / ca.DM([limit.size for limit in self.path])
+
+    @cached_property
     def rows(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper ends of the limits along the path at both points, each by its size."""
         sizes = np.array([limit.size for limit in self.path], dtype=float)
@@ -149,17 +157,13 @@ class HorizonStages:
         cost = self.at_point(self.phase.integrand)
         hessian, gradient = ca.hessian(cost, y)
         some = self.costly.tolist()
-        column = ca.vertcat(ca.SX(0, 1), *(limit.expression for limit in self.path))
-        rows = (
-            self.at_point(column) / ca.DM([limit.size for limit in self.path]) if self.path else ca.SX(0, 1)
-        )
         out = [
             self.equations,
             ca.jacobian(self.equations, y),
             gradient,
             hessian[some, some],
-            rows,
-            ca.jacobian(rows, y),
+            self.limits,
+            ca.jacobian(self.limits, y),
         ]
         return ca.Function("point", [y, t, courses], [ca.densify(one) for one in out])
 
@@ -235,6 +239,12 @@ class HorizonStages:
         slope += np.einsum("p,npiv,npi->nv", weights, some[..., 1:], bent[..., 0])
         H = np.einsum("p,npiv,npiw->nvw", weights, some[..., 1:], bent[..., 1:])
         return convex(H), slope
+
+    @cached_property
+    def merits(self) -> ca.Function:
+        """Equations, integrand and limits at a point, of its scaled signals, its time and courses."""
+        parts = [self.equations, self.at_point(self.phase.integrand), self.limits]
+        return ca.Function("merits", list(self.symbols), [ca.densify(one) for one in parts])
 
     @cached_property
     def _at_points(self) -> AtPlaces:

@@ -45,6 +45,7 @@ class Terminal:
         self.there = not ca.SX(cost).is_constant()
         self.stages = stages
         if self.there:
+            self.cost = ca.Function("cost", [y, t, courses], [cost])
             hessian, gradient = ca.hessian(cost, y)
             self.derivatives = ca.Function(
                 "end", [y, t, courses], [ca.densify(gradient), ca.densify(hessian)]

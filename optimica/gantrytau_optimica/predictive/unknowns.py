@@ -4,7 +4,7 @@ input disturbance d of u:    the equations have u + d in the place of u, costs a
 output disturbance d of y:   costs, limits and measurements have y + d in the place of y, the equations keep y
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -19,6 +19,7 @@ from gantrytau.flattening.flat_model import FlatModel, FlatParameter
 from gantrytau_optimica.control.build import build
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Course
+from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.problem.read_problem import read_problem
 from gantrytau_optimica.problem.symbolic_problem import SymbolicProblem
@@ -194,3 +195,29 @@ def _limits(read: SymbolicProblem, name: str) -> tuple[float, float]:
     low = -np.inf if owner.min is None else read.dae.number(owner.min[k])
     high = np.inf if owner.max is None else read.dae.number(owner.max[k])
     return low, high
+
+
+def staged(
+    problem: Any, period: float, disturbance: Sequence[str] = (), parameters: Sequence[str] = ()
+) -> tuple[Any, HorizonStages, dict[str, float]]:
+    """The problem in states, algebraics and inputs, its stages, and estimates by name; ModelError for what no receding
+    horizon can have.
+    """
+    disturbance, parameters = ((one,) if isinstance(one, str) else one for one in (disturbance, parameters))
+    built, estimates = as_courses(with_unknowns(problem, parameters, disturbance, "Mpc"), parameters)
+    read, found = built.read, built.problem
+    if found.free:
+        names = ", ".join(n.name for n in found.free)
+        raise ModelError(
+            f"{names} is free, expected a number: a receding horizon has a fixed length and a fixed model; give it a value, "
+            "as in final_time = 1.0",
+            place=read.name,
+        )
+    if not all(phase.inputs and phase.states for phase in found.phases):
+        words = (
+            "there is no input to choose; declare one as Input"
+            if found.phases[0].states
+            else "there is no state"
+        )
+        raise ModelError(words, place=read.name)
+    return built, HorizonStages(found, period), estimates

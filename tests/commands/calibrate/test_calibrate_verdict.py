@@ -166,8 +166,10 @@ def off_in_base(folder, q, r):
     )
 
 
-@pytest.mark.parametrize(("off", "words"), [(0.05, "the target, 50 mm from"), (0.0, "the tool itself, not")])
-@pytest.mark.parametrize("said", [(), ("--frame", "base")])
+@pytest.mark.parametrize(
+    ("off", "words", "said"),
+    [(0.05, "the target, 50 mm from", ()), (0.0, "the tool itself, not", ("--frame", "base"))],
+)
 def test_what_was_measured_in_the_base_is_right_there(folder, answer, off, words, said):
     file, q, r = measured_in_base(folder, (off, 0.0, 0.0))
     found = answer("calibrate", file, *said)

@@ -158,7 +158,7 @@ def test_a_full_disk_does_not_cost_the_answer(fails, run, move, tmp_path, monkey
     assert json.loads(run(*arguments, "--json").stdout)["final_time"] == pytest.approx(fastest(), abs=1e-5)
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".nc"])
+@pytest.mark.parametrize("suffix", first_of([".csv", ".nc"]))
 def test_a_saved_motion_is_where_the_next_search_starts(answer, move, tmp_path, suffix, monkeypatch):
     file = tmp_path / f"move{suffix}"
     answer("optimize", move, "--save", file)

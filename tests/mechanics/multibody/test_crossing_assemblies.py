@@ -56,7 +56,7 @@ def until_singular(model: Dae, **settings: Any):
         return error.result, error.time
 
 
-@pytest.mark.parametrize("points", POINTS)
+@pytest.mark.parametrize("points", POINTS[1::3])
 def test_every_grid_stops_at_the_flat_pose(points):
     with pytest.raises(SolveError, match="singular pose") as caught:
         simulate(at_rest(), stop=1.0, points=points)

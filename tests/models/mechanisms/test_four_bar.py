@@ -147,7 +147,7 @@ def test_flat_parallelogram_is_told_as_singular():
     np.testing.assert_allclose(before["rocker.phi"], before["crank.phi"], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("start", [-2.0, 0.3, 1.0, 2.9, 7.0])
+@pytest.mark.parametrize("start", [-2.0, 0.3, 7.0])
 def test_parallelogram_starts_parallel(start):
     at = translate(parallelogram(start)).evaluate()
     assert at["crank.phi"] == pytest.approx(start, abs=1e-12)

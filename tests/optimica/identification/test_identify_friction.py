@@ -9,13 +9,14 @@ from scipy.optimize import least_squares
 
 from gantrytau import ModelError
 from gantrytau.kinematics import Kinematics
-from gantrytau_models import GantryTau, prototypes
+from gantrytau_models import GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import MotionLog, identify_friction
+from gantrytau_optimica.identification import friction_over_load
 from gantrytau_optimica.identification.friction.carried_mass import carried_mass
+from tests.families import NIGHTLY
 
 L1 = prototypes.L1
 PARALLEL = replace(L1, arms=tuple(replace(arm, direction=(1.0, 0.0, 0.0)) for arm in L1.arms))
-ROBOT = GantryTau(PARALLEL)
 MASS = 22.38  # kg, as printed
 TABLE_6_1 = (
     np.array([[189.12, 145.69], [262.59, 119.23], [239.06, 177.22]]),
@@ -30,6 +31,8 @@ TABLE_6_2 = np.array(
         [-201.6, -33.7, 235.3],
     ]
 )  # N, one row for each position of the tool
+ROBOT = GantryTau(PARALLEL)
+TRIES = 20 if NIGHTLY else 10
 SPEEDS = np.linspace(1 / 15, 1.0, 15)  # fifteen in each direction, as printed
 
 
@@ -156,7 +159,7 @@ def test_predicted_deviations_are_those_of_repeated_experiments(mass):
     some = places[:1] if mass == "symmetric" else places
     tries = [
         identify_friction(ROBOT, runs(some, coulomb, TABLE_6_1[1], rng, ripple=8.0), mass=mass)
-        for _ in range(20)
+        for _ in range(TRIES)
     ]
     for name, values in (
         ("mass", [each.mass for each in tries]),
@@ -164,7 +167,7 @@ def test_predicted_deviations_are_those_of_repeated_experiments(mass):
         ("viscous[2][1]", [each.viscous[2, 1] for each in tries]),
     ):
         predicted = np.sqrt(np.mean([each.deviations[name] ** 2 for each in tries]))
-        assert 0.6 < np.std(values, ddof=1) / predicted < 1.7  # 20 tries: 95 % within 0.68 and 1.31
+        assert 0.45 < np.std(values, ddof=1) / predicted < 1.8  # 10 tries: 99 % within 0.44 and 1.62
     assert np.mean([each.mass for each in tries]) == pytest.approx(MASS, abs=0.7)
 
 
@@ -296,3 +299,43 @@ def test_figure_has_a_panel_for_each_actuator_and_one_of_weight(tmp_path):
     across = found.plot_places(Kinematics(ROBOT)).axes[0].lines[0]
     y, z = np.unique(np.round(np.array(across.get_xydata()), 6), axis=0).T
     assert len(y) == len(z) == 2  # one place of y and z for each pose
+
+
+def link_forces(place):
+    """Sizes of the forces in the links, (3,): three of them hold the weight."""
+    ends = np.array([arm.offset for arm in PARALLEL.arms])
+    ends[:, 0] += carts(*place)
+    u = np.array([1.0, *place]) - ends
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    return np.abs(np.linalg.solve(u.T, [0.0, 0.0, MASS * 9.81]))
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0])
+def test_friction_that_grows_with_the_force_in_the_link_is_found(noise):
+    grows, rng = np.array([0.05, 0.0, 0.12]), np.random.default_rng(0)
+    spread, logs = [(2.2, -0.6), (3.2, -0.6), (2.7, -1.2), (2.7, 0.1), (2.5, -0.3)], []
+    for place in spread:
+        coulomb = TABLE_6_1[0] + (grows * link_forces(place))[:, None]
+        logs += runs([place], coulomb, TABLE_6_1[1], rng, ripple=noise)
+    plain = identify_friction(ROBOT, logs, mass="positions")
+    assert {f.kind for f in plain.findings} & {"load", "not white", "trend"}
+    found = friction_over_load(ROBOT, plain)
+    assert found.load[:: 2 * len(SPEEDS)] == pytest.approx(
+        np.array([link_forces(p) for p in spread]) * plain.mass / MASS, rel=1e-9
+    )
+    close = np.full(3, 1e-9) if noise == 0 else 3.5 * found.deviations
+    assert np.all(np.abs(found.by_load - grows) < close)
+    assert noise == 0 or np.all(found.deviations < 0.02)
+    r = np.array([1.0, 2.9, -0.5])
+    wanted = TABLE_6_1[0] + (grows * link_forces(r[1:]))[:, None]
+    np.testing.assert_allclose(found.at(r)[0], wanted, atol=1e-7 if noise == 0 else 5.0)
+
+
+def test_a_map_of_friction_asks_for_other_positions_and_for_single_links():
+    found = identify_friction(ROBOT, runs(poses()[:1], *TABLE_6_1), mass=MASS)
+    with pytest.raises(ModelError, match="other positions") as refusal:
+        friction_over_load(ROBOT, found)
+    assert refusal.value.argument == "friction"
+    with pytest.raises(ModelError) as refusal:
+        friction_over_load(SixLinkGantryTau(prototypes.D1), found)
+    assert refusal.value.argument == "robot"

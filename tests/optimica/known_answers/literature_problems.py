@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Input, Model, Real, between, cos, der, sign, sin
+from gantrytau import Input, Model, Real, between, cos, der, sin
 from gantrytau_optimica import Free, Optimization, final, initial
 
 
@@ -240,27 +240,3 @@ class Reorientation(Optimization):
         turned = np.radians(150) / 2
         yield final(self.body.q) == [np.sin(turned), 0.0, 0.0, np.cos(turned)]
         yield final(self.body.w) == [0.0, 0.0, 0.0]
-
-
-class Sliding(Model):
-    """A mass with Coulomb friction."""
-
-    q, v = Real(start=0.0, fixed=True), Real(start=1.0, fixed=True)
-    u = Input(min=-2.0, max=2.0)
-
-    def equations(self):
-        yield der(self.q) == self.v
-        yield der(self.v) == self.u - sign(self.v)
-
-
-class CoulombFriction(Optimization):
-    """Back to -1 against the first speed, in least time."""
-
-    mass, final_time = Sliding(), Free(2.0, min=0.1, max=10.0)
-
-    def objective(self):
-        return self.final_time
-
-    def constraints(self):
-        yield final(self.mass.q) == -1
-        yield final(self.mass.v) == 0

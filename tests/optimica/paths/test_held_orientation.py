@@ -8,7 +8,8 @@ import pytest
 from gantrytau import StructureError, between
 from gantrytau_models import F1GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
-from gantrytau_optimica.paths.path import Path, Way
+from gantrytau_optimica.paths.path import Path
+from gantrytau_optimica.paths.way import Way
 from tests.optimica.known_answers.closed_loops import PAIRS, quaternion
 
 BEGIN, END = PAIRS["f1"]["pairs"][0]

@@ -8,7 +8,8 @@ from gantrytau import Bounds, Model, ModelError, Parameter, Real, StateSelect, b
 from gantrytau.language.functions import dot
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica import Free, Optimization, final, initial, optimize
-from gantrytau_optimica.paths.path import Path, Way
+from gantrytau_optimica.paths.path import Path
+from gantrytau_optimica.paths.way import Way
 from tests.optimica.paths.phase_plane import OnPath
 
 START, END = np.array([0.0, 2.51, -1.03]), np.array([1.711, 3.46, -0.24])

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from gantrytau import ModelError
-from gantrytau_optimica.paths.path import Deviation, Path, Way
+from gantrytau_optimica.paths.path import Deviation, Path
+from gantrytau_optimica.paths.way import Way
 
 START, END = np.array([0.0, 2.51, -1.03]), np.array([1.711, 3.46, -0.24])
 ARC = (START, [0.3, 2.5, -0.85], [0.9, 2.75, -0.5], [1.4, 3.1, -0.35], END)

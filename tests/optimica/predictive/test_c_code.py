@@ -165,6 +165,40 @@ def test_estimates_are_given_behind_the_state_in_c(tmp_path):
     np.testing.assert_allclose(Controller(code, tmp_path).run(rows), inputs, atol=2e-8)
 
 
+def test_an_mpc_in_machine_code_gives_what_it_gave_before(tmp_path, monkeypatch):
+    monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))  # 3 s to compile
+    keywords = dict(
+        rates={"pole.f": (-200.0, 100.0)}, blocks=[1, 1, 2, 4], disturbance=["pole.f"], terminal="lqr"
+    )
+    mpc = Mpc(Upright, period=0.05, elements=15, **keywords)
+    beyond = {"pole.p": 2.2, "pole.th": 0.0, "pole.v": 0.0, "pole.w": 0.0, "disturbance(pole.f)": 0.5}
+
+    def found():
+        loop = mpc.run(stop=1.0, noise=NOISE, seed=4)
+        mpc.reset()
+        return [*loop["pole.f"], mpc.step(beyond)["pole.f"], *mpc.plan["pole.p"]], loop.statuses, mpc.softened
+
+    numbers, *words = found()
+    assert mpc.compiled()
+    again, *said = found()
+    np.testing.assert_allclose(again, numbers, atol=1e-7)
+    assert words == said
+    assert mpc.softened
+
+
+def test_a_model_that_is_no_c_is_called_from_python(tmp_path, monkeypatch):
+    monkeypatch.setenv("GANTRYTAU_CACHE", str(tmp_path))
+
+    class Sampled(Upright):
+        def integrand(self):
+            return (self.pole.p - sin(time)) ** 2 + self.pole.th**2 + 0.01 * self.pole.f**2
+
+    mpc = Mpc(Sampled, period=0.05, elements=5, terminal="lqr")
+    assert mpc.compiled()
+    assert mpc._newton.code is None
+    assert mpc.run(stop=0.2).statuses == ("solved",) * 4
+
+
 @pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
 def test_the_c_has_no_heap_and_no_memory_of_its_own(tmp_path):
     _, source = Mpc(Upright, period=0.05, elements=5).c_code().write(tmp_path)

@@ -1,11 +1,15 @@
 """`Mpc`: next to the infinite-horizon regulator, next to `optimize`, and with a world that is not as expected."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from gantrytau import Input, Model, ModelError, Parameter, Real, animate, between, cos, der, sin
+from gantrytau.viewing.film import film_of
+from gantrytau.viewing.solids import ghosts, solids
 from gantrytau_models import DeltaRobot
 from gantrytau_optimica import Free, Mpc, Optimization, at, final, initial, optimize
 
@@ -185,6 +189,14 @@ def test_closed_kinematic_loops_need_nothing_more():
     np.testing.assert_allclose(loop["robot.tool.r"][-1], [0.1, 0.05, -0.75], atol=1e-4)
     assert np.abs(loop["robot.arms[0].tau"]).max() <= 15.0
     assert "Reach, closed loop" in animate(loop).text
+    film = film_of(loop)
+    moving = [solid for solid in solids(film) if solid.role in ("bar", "ball", "body") and not solid.rests]
+    seen = list(ghosts(film))
+    assert film.ghost is not None
+    np.testing.assert_allclose(
+        film.ghost.values("robot.tool.r", (3,))[::12], loop.planned["robot.tool.r"][::10], atol=1e-12
+    )
+    assert {solid.owner for solid in seen} == {s.owner for s in moving if s.kind != "axes"}
 
 
 class FreeEnd(Rest):
@@ -234,3 +246,37 @@ def test_the_unit_of_the_objective_does_not_count(size):
     state = {"pole.p": 0.3, "pole.th": 0.2, "pole.v": 0.0, "pole.w": 0.0}
     given = [Mpc(one, period=0.05, elements=10).step(state)["pole.f"] for one in (Upright, Sized)]
     assert given[1] == pytest.approx(given[0], rel=1e-6)
+
+
+def test_a_loop_goes_on_as_if_it_had_not_ended():
+    mpc = Mpc(Upright, period=0.05, elements=10, delay=1)
+    plant: Any = Upright(pole=dict(length=0.6))
+    given: Any = dict(noise={"pole.th": 0.005}, seed=3)
+    whole, first = mpc.run(plant, stop=0.5, **given), mpc.run(plant, stop=0.2, **given)
+    found = mpc.run(plant, stop=0.5, after=first, **given)
+    assert found.statuses == whole.statuses
+    assert found.cost == pytest.approx(whole.cost, rel=1e-9)
+    np.testing.assert_allclose(found["pole.f"], whole["pole.f"], rtol=0, atol=1e-8)
+    np.testing.assert_array_equal(found["pole.th"][:5], first["pole.th"])
+    assert len(found.timing.step) == 10
+    others: list[Any] = [
+        (dict(stop=0.2), "found stop=0.2, expected at least one period of 0.05 s after 0.2 s"),
+        (dict(stop=1.0, start={"pole.p": 0.0}), "start= beside it, expected none"),
+        (dict(stop=1.0, plant=Upright), "pole.length = 0.6 of its plant and 0.5 of this one"),
+    ]
+    for keywords, words in others:
+        with pytest.raises(ModelError) as raised:
+            mpc.run(**(dict(plant=plant, after=first) | keywords))
+        assert words in str(raised.value)
+
+
+def test_plans_are_kept_and_end_where_they_are_planned_to():
+    mpc = Mpc(Upright, period=0.05, elements=10)
+    loop = mpc.run(stop=0.3)
+    assert loop.plans["pole.th"].shape == (6, 11)
+    np.testing.assert_allclose(loop.plans["pole.th"][:, 0], loop["pole.th"][:-1], atol=1e-9)
+    np.testing.assert_allclose(loop.planned["pole.th"][:-1], loop.plans["pole.th"][:, -1], atol=1e-12)
+    np.testing.assert_allclose(loop.plans["pole.th"][-1], mpc.plan["pole.th"], atol=1e-12)
+
+    figure = loop.plot("pole.th", "pole.f", plans=3)
+    assert [len(axis.get_lines()) for axis in figure.axes] == [8]

@@ -30,9 +30,6 @@ class Tracked(Optimization):
         return (self.model.u - time / self.second) ** 2
 
 
-STATIC = "checking.static looks at equations only: one point is transcribed, though time enters elsewhere"
-
-
 def test_a_cost_that_depends_on_time_is_not_static():
     # t - 1/2 is missed in the second half: integral of s^2 from 0 to 1/2
     assert optimize(Tracked, elements=10).objective == pytest.approx(1 / 24, abs=1e-6)

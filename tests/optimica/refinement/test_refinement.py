@@ -124,9 +124,6 @@ def test_the_robot_on_a_straight_line():
     assert np.linalg.norm(optimum.playback["robot.tool.r"][-1] - [1.711, 3.46, -0.24]) < 1e-5
 
 
-UNMOVED = "refinement._holds: where nothing errs the second mesh is the first, so the objective 'stands still' unchecked"
-
-
 @pytest.mark.parametrize(
     "elements",
     [

@@ -324,9 +324,6 @@ def test_the_answer_is_no_worse_than_its_best_branch():
     assert optimum.objective <= optimum.search.branches[0].objective + 1e-6
 
 
-COARSE = "prepared._coarse halves the elements but not the groups of elements that make a piece"
-
-
 def test_branches_keep_the_pieces_of_the_caller():
     # eight pieces in either case; 40 elements carry them exactly, and so do 20
     controls = {"mass.u": dict(kind="constant", elements=5)}

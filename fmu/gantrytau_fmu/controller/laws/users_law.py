@@ -4,8 +4,12 @@ import os
 from collections.abc import Mapping
 from typing import Any, cast
 
+from numpy.typing import ArrayLike
+
 from gantrytau import Dae, Model
 from gantrytau.border.refusal import ModelError
+from gantrytau_fmu.controller.board import ACTIVATE
+from gantrytau_fmu.controller.channels import Channel, Declaration, Values
 from gantrytau_fmu.controller.laws.compiled_law import SUFFIXES, CompiledLaw
 from gantrytau_fmu.controller.laws.law import FunctionLaw, Law, LawFunction, PartLaw
 from gantrytau_fmu.controller.stepped_part import SteppedPart
@@ -13,9 +17,11 @@ from gantrytau_fmu.systems.sources.python_component import PythonComponent
 
 
 def users_law(controller: Any, wires: Mapping[str, str]) -> Law:
-    """A function, a model, an FMU file, a shared library or a `PythonComponent` as a law; ModelError for anything else."""
-    if isinstance(controller, (str, os.PathLike)) and str(controller).lower().endswith(SUFFIXES):
-        found: Law = CompiledLaw(os.fspath(controller))
+    """A function, a model, an FMU file, a shared library, a `PythonComponent` or None as a law; ModelError for others."""
+    if controller is None:  # references stay as they are
+        found: Law = FunctionLaw(lambda t, values: {})
+    elif isinstance(controller, (str, os.PathLike)) and str(controller).lower().endswith(SUFFIXES):
+        found = CompiledLaw(os.fspath(controller))
     elif isinstance(controller, (str, os.PathLike, Model, Dae, PythonComponent)):
         return PartLaw(SteppedPart("controller", controller), wires)
     elif callable(controller):
@@ -28,3 +34,18 @@ def users_law(controller: Any, wires: Mapping[str, str]) -> Law:
     if wires:
         raise ModelError("wires: found some, expected them with a model or an FMU; others take all by name")
     return found
+
+
+def tunables_of(law: Law, parameters: Mapping[Channel, ArrayLike]) -> tuple[Declaration, Values]:
+    """Those that are given, f_activate, and those of the law, with their values; ModelError for values that are none."""
+    own = law.tunables
+    channels = [*parameters, *own]
+    values: dict[str, ArrayLike] = {channel.name: value for channel, value in parameters.items()}
+    values |= {name: law.tuned[place] for name, place in own.slices.items()}
+    if ACTIVATE.name not in values:
+        channels, values = [ACTIVATE, *channels], {ACTIVATE.name: 0.0} | values
+    tunables = Declaration(channels)
+    found = tunables.vector(values)
+    if refusal := tunables.refusal(found):
+        raise ModelError(f"parameters: {refusal}", argument="parameters")
+    return tunables, found

@@ -10,11 +10,11 @@ from typing import Any
 from gantrytau.border.checks import number
 from gantrytau.border.refusal import ModelError
 from gantrytau.describing.record import Record
-from gantrytau_fmu.reading.check_fmu import TIMEOUT, check_fmu
 from gantrytau_fmu.reading.fmu_file import SHOWN
 from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first
 from gantrytau_fmu.reading.read_fmu import read_fmu
 from gantrytau_fmu.reading.safety import unpack
+from gantrytau_fmu.systems.checking.check_fmu import TIMEOUT, check_fmu
 from gantrytau_fmu.systems.component import Component, read_component
 from gantrytau_fmu.systems.connected_system import ConnectedSystem, build_system, unconnected
 from gantrytau_fmu.systems.ssp.read_ssp import SystemStructure, matching, read_ssp, structure_of

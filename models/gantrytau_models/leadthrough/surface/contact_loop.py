@@ -133,17 +133,6 @@ class ContactLoop:
         """The gain over the critical one: from 1 on the loop is unstable."""
         return self.gain / self.critical_gain
 
-    def rivals(self) -> str:
-        """What else would sound at the same frequency, which a recording of the force alone cannot tell apart."""
-        crossover, sampling = self.crossover, 1 / self.period
-        share, mode = f"{100 * self.share:.0f} % of its critical gain", f"{1.03 * crossover:.0f} Hz"
-        return (
-            f"{crossover:.1f} Hz may be this loop at {share}; or a mode of the structure near {mode} with little damping, "
-            f"at a tenth of the gain; or {sampling - crossover:.0f} Hz, if the force was recorded every "
-            f"{1000 * self.period:g} ms without a filter before it. A step of the gain tells: only the loop's own frequency "
-            "stays while its amplitude grows without bound."
-        )
-
     def __str__(self) -> str:
         critical = f"{100 * self.share:.0f} % of the critical {self.critical_gain:.4g} 1/s"
         return f"gain {self.gain:.4g} 1/s, {critical}, where it swings with {self.crossover:.1f} Hz"

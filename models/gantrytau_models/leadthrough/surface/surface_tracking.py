@@ -11,6 +11,7 @@ from gantrytau import Input, Model, Output, Parameter, Real, require, white_nois
 from gantrytau.border.checks import instance
 from gantrytau.inputs.random_signals import WhiteNoise
 from gantrytau.language.model import merge
+from gantrytau_models.leadthrough.adaptive_gain import AdaptiveForceControl
 from gantrytau_models.leadthrough.assumed import operators
 from gantrytau_models.leadthrough.assumed.records import OperatorRecord, SurfaceRecord
 from gantrytau_models.leadthrough.lead_through import LeadThrough
@@ -145,9 +146,10 @@ class SurfaceTracking(ToolOnSurface):
     ):
         control = merge(dict(tool_control=tool_control), modifications.pop("control", {}))
         super().__init__(surface, pressing=tool_control, operator=operator, control=control, **modifications)
-        # an arm that is no servo with a lag of first order has another loop
+        # an arm that is no servo with a lag of first order has another loop, and a gain that adapts finds its own
+        adapts = isinstance(control.get("tool"), AdaptiveForceControl)
         lagging = not isinstance(arm := modifications.get("arm"), LedArm) or hasattr(arm, "T_v")
-        if tool_control and lagging and (loop := contact_loop(self)).share >= 1:
+        if tool_control and lagging and not adapts and (loop := contact_loop(self)).share >= 1:
             warnings.warn(
                 f"SurfaceTracking: the tool will hop on the surface: {loop}; a smaller control.tool.K or a softer "
                 "surface holds it",

@@ -71,20 +71,6 @@ class ErrorMap(Record):
         """Root mean square along each axis in m, (3,): sqrt(D / N)."""
         return np.sqrt(self.eigenvalues / len(self.errors))
 
-    @property
-    def axis_errors(self) -> Array:
-        """Standard error of the direction of each axis in rad, (3,), for errors that are independent and normal.
-
-        Anderson (1963): axis i turns towards j by sqrt(D_i D_j / N) / |D_i - D_j|. At most pi / 2: axes of equal size
-        have no direction.
-        """
-        D = self.eigenvalues
-        gap = np.abs(D[:, None] - D)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            towards = D[:, None] * D / (len(self.errors) * gap**2)
-        towards[np.diag_indices(3)] = 0.0
-        return np.minimum(np.sqrt(np.nansum(towards, axis=1)), np.pi / 2)
-
     @cached_property
     def systematic(self) -> float:
         """Part of the squared errors that the mean of the nearest poses' errors predicts, 0 for noise, up to 1.

@@ -57,22 +57,6 @@ def draw_backlash(
     return finished(figure, file)
 
 
-def draw_spectrum(
-    periods: np.ndarray, amplitudes: np.ndarray, pitch: float | None, file: str | os.PathLike[str] | None
-) -> "Figure":
-    """Amplitudes over periods, and where the pitch is."""
-    figure, (axis,) = panels_of(1, file)
-    names = ("along the axis", "across, to the side", "across, upwards")
-    for name, amplitude in zip(names, amplitudes.T, strict=False):
-        axis.plot(1e3 * periods, MICRO * amplitude, label=name)
-    if pitch is not None:
-        axis.axvline(1e3 * pitch, color="k", linewidth=0.6, linestyle=":", label="pitch")
-    axis.set_xlabel("period [mm]")
-    axis.set_ylabel("amplitude [µm]")
-    axis.legend(fontsize="small")
-    return finished(figure, file)
-
-
 def panels_of(
     rows: int, file: str | os.PathLike[str] | None, columns: int = 1, **policy: Any
 ) -> "tuple[Figure, list[Any]]":

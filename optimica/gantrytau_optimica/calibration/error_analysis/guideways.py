@@ -156,14 +156,6 @@ class Linearity(Record):
             sides[name] = self.q[rows], self.along[rows], smooth
         return draw_backlash(sides, self.backlash, self.backlash_error or 0.0, file)
 
-    def plot_spectrum(self, periods: Any, *, file: str | os.PathLike[str] | None = None) -> "Figure":
-        """The least-squares spectrum over periods (F,) in m."""
-        from gantrytau_optimica.calibration.error_analysis.guideway_figures import draw_spectrum
-
-        periods = np.asarray(periods, dtype=float)
-        pitch = self.cyclic.pitch if self.cyclic is not None else None
-        return draw_spectrum(periods, self.spectrum(periods), pitch, file)
-
     def __str__(self) -> str:
         micro = 1e6
         lines = [

@@ -11,7 +11,7 @@ An arm without turntables is one of (4.14), or of (4.13) where the plate cannot 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from gantrytau.language.self_description.rods import RodArm, RodTurntable, Singl
 from gantrytau_optimica.calibration.links.nominal_rods import NominalRods, read_nominal
 
 Orientation = Literal["local", "unit", "free"]
-ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,10 +34,16 @@ class Usable(Record):
 
 
 def usable(
-    robot: Model, measurements: Measurements, parameters: Sequence[str], joints: Sequence[str] | None
+    robot: Model,
+    measurements: Measurements,
+    parameters: Sequence[str],
+    joints: Sequence[str] | None,
+    component: str,
 ) -> Usable:
-    """Tool function and usable rows of a robot; joints: columns of q, None for the driven ones."""
-    tool = tool_function(robot, parameters, joints, measurements.R is not None)
+    """Tool function and usable rows of a robot; joints: columns of q, None for the driven ones; component: name
+    of what was measured.
+    """
+    tool = tool_function(robot, parameters, joints, measurements.R is not None, component)
     if measurements.q.shape[1] != len(tool.joints):
         raise ModelError(
             f"calibrate: found measurements of {measurements.q.shape[1]} joints for {tool.dae.name}, expected "

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gantrytau import Dae, Model, ModelError, SolveError, translate
+from gantrytau import Model, ModelError, SolveError, translate
 from gantrytau.border.checks import check_words, number, whole
 from gantrytau_optimica.identification.excitation.excitation_limits import ExcitationLimits, excitation_limits
 from gantrytau_optimica.identification.excitation.excitation_program import Criterion, ExcitationProgram
@@ -85,16 +85,6 @@ def design_excitation(
         start,
         by_actuators,
     )
-
-
-def _with_a_tool(dae: Dae) -> Dae:
-    if TOOL[0] not in dae.variables:
-        raise ModelError(
-            f"{dae.name} has no tool.r, expected a robot with the position of its tool",
-            place="design_excitation",
-            argument="robot",
-        )
-    return dae
 
 
 def whole_periods(duration: float, harmonics: int, limits: ExcitationLimits) -> float:

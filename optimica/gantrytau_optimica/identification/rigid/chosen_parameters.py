@@ -50,7 +50,7 @@ def asked_parameters(
     if parameters is None:
         own = candidates(dae) if friction else (*candidates(dae), *frictions(dae))
         return tuple(n for n in own if n not in given)
-    known = dict.fromkeys((*candidates(dae), *(public_name(dae, n) for n in dae.adjustable)))
+    known = dict.fromkeys((*candidates(dae), *(public_name(n) for n in dae.adjustable)))
     bodies = {body.path: body for body in bodies_of(dae)}
     wanted = [parameters] if isinstance(parameters, str) else list(parameters)
     found: tuple[str, ...] = ()
@@ -89,7 +89,7 @@ def _check_body(dae: Dae, body: BodyParameters, wanted: Sequence[str], given: Ma
 def fixed_values(dae: Dae, fixed: Mapping[str, Any], n: int, friction: Law | None) -> dict[str, Any]:
     """Values by scalar name; of frictions a number, or a pair at positive and at negative speed."""
     theirs = frictions(dae) if friction else ()  # zero beside the law that is identified
-    own = tuple(dict.fromkeys(public_name(dae, p) for p in dae.adjustable if p not in theirs))
+    own = tuple(dict.fromkeys(public_name(p) for p in dae.adjustable if p not in theirs))
     laws = [f"{word}[{i}]" for word in words(friction or "symmetric") for i in range(n)] if friction else []
     sides = [name + side for name in laws for side in SIDES] if friction == "asymmetric" else []
     found: dict[str, Any] = {}

@@ -184,7 +184,7 @@ def model_name(dae: Dae, name: str) -> str:
     return PUBLIC[parted[1]].format(parted[2]) if parted and parted[1] in PUBLIC else name
 
 
-def public_name(dae: Dae, name: str) -> str:
+def public_name(name: str) -> str:
     """The other way round."""
     if name in PLATE:
         return "plate_mass"
@@ -223,7 +223,7 @@ def candidates(dae: Dae) -> tuple[str, ...]:
         if declared is None or declared.shape != ():
             continue
         if declared.unit in ("kg", "kg.m2") and not LAWS.search(name):
-            found.append(public_name(dae, name))
+            found.append(public_name(name))
     return tuple(dict.fromkeys(found))
 
 
@@ -234,7 +234,7 @@ def bodies_of(dae: Dae) -> tuple[BodyParameters, ...]:
         element, declared = f"{path}.m", dae.flat.find(f"{path}.m")
         if element not in adjustable and isinstance(declared, FlatParameter) and declared.value:
             element = str(declared.value[0])  # where the mass is that of a parameter of the robot
-        body = BodyParameters(path, public_name(dae, element), element)
+        body = BodyParameters(path, public_name(element), element)
         if adjustable.issuperset(body.elements):
             found.append(body)
     return tuple(found)

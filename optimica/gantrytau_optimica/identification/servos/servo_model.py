@@ -59,11 +59,6 @@ class ServoModel(Record):
         return dict(zip(self.names, np.sqrt(np.diag(self.matrix)).tolist(), strict=True))
 
     @property
-    def static_gain(self) -> np.ndarray:
-        """Position over reference at rest, b / (1 - a), (n,)."""
-        return self.gain / (1 - self.pole)
-
-    @property
     def time_constant(self) -> np.ndarray:
         """-period / log(a), (n,) in s, without the delay; 0 for a pole at 0."""
         moving = self.pole > 0

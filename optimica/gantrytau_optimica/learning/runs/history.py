@@ -98,10 +98,6 @@ class History(Record):
         """What is wanted less what was estimated in run k, (N, m): (7.23) or (7.24)."""
         return self.wanted - self.estimates[k]
 
-    def joint_error(self, k: int = -1) -> np.ndarray:
-        """References of the joints without corrections less measured positions in run k, (N, n): (7.23)."""
-        return self.q_ref[0] - self.q[k]
-
     def tool_error(self, k: int = -1) -> np.ndarray:
         """Reference of the tool less its measured position in run k, (N, 3): (7.24)."""
         return self.reference.r - self.tool[k]
@@ -110,11 +106,6 @@ class History(Record):
     def relative(self) -> np.ndarray:
         """Errors of what is learnt from in % of those of run 0, (K + 1, m), where corrections apply in full: (7.25)."""
         return self._relative(self.error)
-
-    @property
-    def joint_relative(self) -> np.ndarray:
-        """The same of the joints, (K + 1, n)."""
-        return self._relative(self.joint_error)
 
     @property
     def tool_relative(self) -> np.ndarray:

@@ -123,7 +123,7 @@ def _measured(
     good &= even[:, None]
     blur = _blur(rise[even], offsets)
     lines, spread = _lines(u, np.where(good, t, 0.0), good, noise / usual * np.sqrt(2 * half))
-    corners, sigma = _meet(middle, along, outward, length, lines, spread)
+    corners, sigma = _meet(middle, along, outward, lines, spread)
     count = int(np.isfinite(spread).sum())
     narrow = min(WIDEST * float(length.min()), max(NARROWEST, 3.2 * blur))
     return Edges(corners, sigma, count, usual), narrow
@@ -165,9 +165,7 @@ def _lines(u: Array, t: Array, good: Array, noise: float) -> tuple[Array, Array]
     return np.column_stack([mt - slope * mu, slope]), np.where(fine, np.maximum(scatter, EXACT), np.nan)
 
 
-def _meet(
-    middle: Array, along: Array, outward: Array, length: Array, lines: Array, spread: Array
-) -> tuple[Array, Array]:
+def _meet(middle: Array, along: Array, outward: Array, lines: Array, spread: Array) -> tuple[Array, Array]:
     """Where each edge meets the one before it in its square, (20, 2), and the standard deviation there in pixels."""
     point = middle + lines[:, :1] * outward
     way = along + lines[:, 1:] * outward

@@ -15,7 +15,7 @@ from gantrytau.describing.record import Record
 from gantrytau_optimica.calibration.devices.cameras import PlacedCamera
 from gantrytau_optimica.vision.image_files import file_name, write_image, write_poses
 from gantrytau_optimica.vision.opencv import opencv
-from gantrytau_optimica.vision.scenes.drawing import Wall, bodies, draw, wall_of
+from gantrytau_optimica.vision.scenes.drawing import bodies, draw, wall_of
 from gantrytau_optimica.vision.scenes.scene import GREATEST, Light, Scene
 
 Array = np.ndarray
@@ -72,7 +72,7 @@ def render(
 
     def image(c: int, k: int) -> Array:
         grey = draw(scene, walls[c], r[k], R[k], bodies(scene, cameras[c], bars, k))
-        return expose(grey, walls[c], lights[k], np.random.default_rng([seed, c, k]))
+        return expose(grey, lights[k], np.random.default_rng([seed, c, k]))
 
     rows = range(len(r))
     if folder is None:
@@ -86,7 +86,7 @@ def render(
     return Images(folders, r, R)
 
 
-def expose(grey: Array, wall: Wall, light: Light, random: np.random.Generator) -> Array:
+def expose(grey: Array, light: Light, random: np.random.Generator) -> Array:
     """The image that a camera makes of grey values: light, blur, noise and whole numbers."""
     cv2 = opencv()
     height, width = grey.shape

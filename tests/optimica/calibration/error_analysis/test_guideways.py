@@ -324,7 +324,6 @@ def test_figures_are_written(found, tmp_path):
     for name, draw in (
         ("errors.png", found.plot),
         ("backlash.png", found.plot_backlash),
-        ("spectrum.png", lambda file: found.plot_spectrum(np.linspace(0.008, 0.05, 100), file=file)),
     ):
         draw(file=tmp_path / name)
         assert (tmp_path / name).stat().st_size > 5000

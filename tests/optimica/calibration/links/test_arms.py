@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gantrytau import Array, Model, ModelError, Parameter, SolveError
-from gantrytau.kinematics.rotations import of_vectors, rotation_vector
+from gantrytau.kinematics.rotations import of_vectors
 from gantrytau_models import F1GantryTau, FourBar, GantryTau, SixLinkGantryTau, prototypes
 from gantrytau_optimica.calibration.fitting.fit_arm import fit_arm
 from gantrytau_optimica.calibration.fitting.ipopt_fit import solve
@@ -113,12 +113,6 @@ def test_a_quaternion_of_any_length_is_a_matrix_as_the_thesis_has_it():
     np.testing.assert_allclose(
         rotation(unit), Rotation.from_quat(unit, scalar_first=True).as_matrix(), atol=1e-15
     )
-
-
-def test_rotation_vectors_come_back():
-    vectors = np.array([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.3, -0.2, 0.1], [2.0, 1.0, -1.5]])
-    np.testing.assert_allclose(rotation_vector(of_vectors(vectors)), vectors, atol=1e-14)
-    np.testing.assert_allclose(of_vectors(vectors), Rotation.from_rotvec(vectors).as_matrix(), atol=1e-15)
 
 
 @pytest.mark.parametrize("orientation", ORIENTATIONS)

@@ -6,6 +6,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau_models import GantryTau, prototypes
 from gantrytau_optimica.identification import FURTHER_MODELS, TABLE_6_3, compare_models, printed_models
+from tests.families import NIGHTLY
 from tests.optimica.identification import gantry_logs as logs
 
 COULOMB = np.array([[189.12, 145.69], [262.59, 119.23], [239.06, 177.22]])  # N, Table 6.1
@@ -28,11 +29,12 @@ def test_the_models_of_the_thesis_rank_as_printed():
 
 def test_other_motions_rank_so_too_but_for_old_friction_against_none():
     """Other motions of the same kind. Which of the two worst is worse depends on how fast one is: as printed in 17 of 20."""
+    motions = range(20 if NIGHTLY else 4)
     found = [
-        compare_models(logs.robot(), logs.log(k, logs.REAL, motion_seed=k), MODELS).ranking for k in range(20)
+        compare_models(logs.robot(), logs.log(k, logs.REAL, motion_seed=k), MODELS).ranking for k in motions
     ]
     assert all(ranking[:2] == ("2", "4") for ranking in found)
-    assert found.count(("2", "4", "1", "3")) >= 15
+    assert found.count(("2", "4", "1", "3")) >= 0.75 * len(motions)
 
 
 def test_the_table_stands_beside_the_printed_one():
@@ -57,4 +59,4 @@ def test_the_table_stands_beside_the_printed_one():
 
 def test_no_models_are_refused():
     with pytest.raises(ModelError, match="found no models, expected keywords of identify by name"):
-        compare_models(GantryTau(prototypes.L1), logs.log(0), {})
+        compare_models(logs.robot(), logs.log(0), {})

@@ -14,6 +14,7 @@ from gantrytau_optimica.identification.least_squares.factors import Factors
 from gantrytau_optimica.identification.least_squares.parameter_limits import Condition, ParameterLimits
 from gantrytau_optimica.identification.least_squares.regression import fit
 from gantrytau_optimica.identification.rigid.body_parameters import BodyParameters, pseudo_inertia
+from tests.families import NIGHTLY
 from tests.optimica.identification.rigid.bodies import CENTRE, INERTIA, MASS, Carried, log
 from tests.optimica.identification.rigid.test_identify_closed_chains import CASES, log_of
 
@@ -66,8 +67,8 @@ def test_a_body_is_found_and_stands_in_the_robot(robot):
 
 def test_noise_never_makes_a_body_that_cannot_be(dae):
     """At turns of 0.02 rad least squares alone give negative densities, as in the literature; what is not told is named."""
-    impossible = 0
-    for seed in range(20):
+    impossible, seeds = 0, 20 if NIGHTLY else 5
+    for seed in range(seeds):
         alone = identify(dae, log(0.02, seed), physical=False, **ASKED)
         held = identify(dae, log(0.02, seed), **ASKED)
         lowest = np.linalg.eigvalsh(pseudo_inertia(ten(alone)))[0]
@@ -79,7 +80,7 @@ def test_noise_never_makes_a_body_that_cannot_be(dae):
             assert all(n in told[0].message for n in held.weak)
             assert any(n.startswith("tool.inertia") for n in held.weak)
         assert np.sum(held.squares) <= 1.001 * np.sum(alone.squares)
-    assert impossible >= 15
+    assert impossible >= 0.75 * seeds
 
 
 def test_more_turning_needs_no_condition(dae):

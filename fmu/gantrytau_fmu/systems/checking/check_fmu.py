@@ -20,7 +20,9 @@ from gantrytau_fmu.building.platforms import native
 from gantrytau_fmu.reading.fmu_findings import FmuFinding, errors_first, fault
 from gantrytau_fmu.reading.inconsistencies import inconsistencies
 from gantrytau_fmu.reading.read_fmu import describe, model_of, read_files, schema_problems
+from gantrytau_fmu.reading.reference_results import ReferenceResults, references_of
 from gantrytau_fmu.reading.safety import unpack
+from gantrytau_fmu.systems.checking.rerun_reference import rerun
 
 TIMEOUT = 60.0  # s for a trial run of all interfaces
 _REPORT = 1_000_000  # bytes of the report of a trial run that are read
@@ -42,9 +44,11 @@ def check_fmu(
     """All that is wrong with an FMU, errors first; [] if nothing is.
 
     Looks at the archive (`safety`), the official schemas, what FMPy validates, and what neither of them does: limits
-    and start values, units, the model structure by name, terminals, sources, and which binaries are in it.
+    and start values, units, the model structure by name, terminals, sources, which binaries are in it, and reference
+    results: those that its manifest of FMI-LS-REF (beta) lists, or `NAME_ref.csv` and `NAME_in.csv` beside `NAME.fmu`.
     run: also load its binary for this machine and simulate a few steps, in a process of its own, so that a crash, or
-    no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it.
+    no answer within `timeout` seconds, is a finding. Nothing of the FMU is loaded without it. Reference results are run
+    again: the first signal that leaves them is a finding, and a note says that none does.
     """
     timeout = number("check_fmu", "timeout", timeout, above=0.0, unit="s")
     path = Path(path)
@@ -65,8 +69,16 @@ def _found(path: Path, run: bool, timeout: float) -> list[FmuFinding]:
         tripped = problem.startswith("KeyError") and findings  # over a unit that we found to be undefined
         if not tripped and not problem.startswith(_OURS):
             findings.append(FmuFinding("error", problem))
+    try:
+        references = list(references_of(fmu))
+    except ModelError as error:
+        references = [fault(str(error))]
+    findings += [one for one in references if isinstance(one, FmuFinding)]
     if run:
         findings += _tried(path, fmu.platforms, timeout)
+        if native().name in fmu.platforms and not any(one.severity == "error" for one in findings):
+            for one in references:
+                findings += rerun(fmu, one) if isinstance(one, ReferenceResults) else ()
     return findings
 
 

@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 RELATIVE = 0.002  # of a signal's range, and of the time of the run
 PULSE = (
@@ -17,25 +18,31 @@ def leaves(
     reference_time: np.ndarray,
     reference: np.ndarray,
     nominal: float = 1.0,
-) -> np.ndarray:
-    """The times at which the reference is outside of the tube around the values.
+    *,
+    relative: float = RELATIVE,
+    absolute: float = ABSOLUTE,
+    wide: ArrayLike | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The times at which the reference is outside of the tube around the values, and its distance from them there.
 
     The tube is the union of the rectangles around all points of the trajectory, the straight lines between its points
-    and the jumps at its double times included: half widths of 0.2 % of the reference's range and of the run's time.
+    and the jumps at its double times included. Half heights: the share `relative` of the reference's range, and
+    `absolute` of its largest value or of `nominal` if that is larger; half width: `wide`, s, a number or one for each time
+    of the reference, by default 0.2 % of the run's time. The distance is infinite where the trajectory has ended or is NaN.
     Pulses of the reference that last less than a millionth of the run, such as a flag between the release of a brake and
     the first motion, have no width in exact arithmetic: they may be outside.
     """
     finite = np.isfinite(reference)
-    high = RELATIVE * np.ptp(reference[finite]) if finite.any() else 0.0
-    high += ABSOLUTE * max(float(np.abs(reference[finite]).max(initial=0.0)), nominal)
-    wide = RELATIVE * (reference_time[-1] - reference_time[0])
-    begin, end = reference_time - wide, reference_time + wide
+    high = relative * np.ptp(reference[finite]) if finite.any() else 0.0
+    high += absolute * max(float(np.abs(reference[finite]).max(initial=0.0)), nominal)
+    half = RELATIVE * (reference_time[-1] - reference_time[0]) if wide is None else wide
+    begin, end = reference_time - half, reference_time + half
     lowest, highest = _extremes(time, values, begin, end)
-    inside = (reference >= lowest - high) & (reference <= highest + high)
-    inside |= ~finite
-    inside &= (begin <= time[-1]) & (end >= time[0])
-    inside |= _pulses(reference_time, inside)
-    return reference_time[~inside]
+    distance = np.maximum(np.maximum(lowest - reference, reference - highest), 0.0)
+    distance[np.isnan(distance) | (begin > time[-1]) | (end < time[0])] = np.inf
+    inside = (distance <= high) | ~finite
+    outside = ~(inside | _pulses(reference_time, inside))
+    return reference_time[outside], distance[outside]
 
 
 def _pulses(time: np.ndarray, inside: np.ndarray) -> np.ndarray:

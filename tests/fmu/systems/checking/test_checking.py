@@ -5,8 +5,8 @@ import re
 import pytest
 
 from gantrytau_fmu.building.platforms import native
-from gantrytau_fmu.reading.check_fmu import check_fmu
 from gantrytau_fmu.reading.safety import DESCRIPTION
+from gantrytau_fmu.systems.checking.check_fmu import check_fmu
 from tests.fmu.tiny_fmus import FMI2, FMI3, TERMINALS, lag2, lag3, pack, running3
 
 HERE = native()
