@@ -247,7 +247,7 @@ def _found(dae: Dae, name: str) -> str:
 
 def _around(code: SampledCode) -> Model:
     """A model with the inputs and outputs of a controller in C, which stands in the place of its sampled formulas."""
-    inputs = {f"given_{k}": Input(start=0.0) for k in range(len(code.given))}
+    inputs = {f"given_{k}": Input(start=code.starts.get(name, 0.0)) for k, name in enumerate(code.given)}
     outputs = {f"found_{k}": Real(start=0.0) for k in range(len(code.find))}
 
     def equations(self: Model):

@@ -12,7 +12,7 @@ class SampledCode:
     """C99 of a sampled controller: `controller_init`, `controller_step` and their memory `controller_state`, no heap.
 
     given, find: names of scalars in the order of the arrays; period: s; real: type of C; units: by name;
-    header, source: texts of `controller.h` and `controller.c`.
+    starts: of what is given, until it is, by name, default 0; header, source: texts of `controller.h` and `controller.c`.
     """
 
     name: str
@@ -21,6 +21,7 @@ class SampledCode:
     period: float
     real: Literal["double", "float"] = "double"
     units: Mapping[str, str] = field(default_factory=dict)
+    starts: Mapping[str, float] = field(default_factory=dict)
     header: str
     source: str
 

@@ -11,7 +11,7 @@ from gantrytau import ModelError
 from gantrytau.answers.c_code import c_source
 from gantrytau.answers.sampled_code import SampledCode
 from gantrytau_optimica.predictive.horizon_qp import RIDGE
-from gantrytau_optimica.predictive.plan import PlannedMotion
+from gantrytau_optimica.predictive.plan import APART, PlannedMotion
 from gantrytau_optimica.predictive.stages import HorizonStages
 from gantrytau_optimica.predictive.terminal import SteadyState, Terminal
 
@@ -48,7 +48,7 @@ def controller_code(
         PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size, NK=len(known),
         NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.any()),
         END=int(mpc.terminal.there), DELAY=mpc.delay, PENALTY=float(penalty), RIDGE=RIDGE,
-        TURNS=TURNS, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
+        TURNS=TURNS, APART=APART, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
         FIRST=limits[0], ITERATIONS=limits[1], STANDS=limits[2],
     )  # fmt: skip
     point = stage_point(stages, mpc.terminal)
@@ -73,9 +73,10 @@ def controller_code(
     flat = mpc.built.read.dae.flat
     own = {*mpc.states, *mpc.inputs}
     units = {n: v.unit for v in flat.variables for n in v.elements if v.unit and n in own}
+    starts = {s.name: float(s.guess(np.zeros(1))[0]) for s in stages.phase.states} | dict(estimates)
     return SampledCode(
-        name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, header=header,
-        source=source,
+        name=mpc.name, given=(*mpc.states, *known), find=mpc.inputs, period=mpc.period, units=units, starts=starts,
+        header=header, source=source,
     )  # fmt: skip
 
 

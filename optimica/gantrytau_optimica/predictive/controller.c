@@ -124,12 +124,12 @@ static void mpc_cost(double weight, const double T[NY][1 + NV], int n, const int
 
 #define J(i, j) jacobian[(i) + (NX + NZ) * (j)] /* of the equations of a point by its signals */
 
-/* A stage that begins at time t linearised at x, w, u, with the estimates that are known; 0 where its equations are singular. See HorizonStages.linear. */
+/* A stage that begins at time t linearised at x, w, u, with the estimates that are known; 0 where its equations are singular or a number is not finite. See HorizonStages.linear. */
 static int mpc_linearise(const double *x, const double *w, const double *u, double t, const double *known,
                          mpc_linear *to) {
     double y[2][NY], e[2][NX + NZ], jacobian[(NX + NZ) * NY], gradient[2][NY], curved[2][ROOM(NC * NC)];
     double rows[ROOM(NL)], slopes[ROOM(NL) * NY], end_g[NY], end_H[ROOM(MPC_END * NY * NY)], z[2][ROOM(NZ)][1 + NV], limits[2][ROOM(NL)][1 + NY];
-    double left[2 * NX][2 * NX], moved[2 * NX][1 + NV], f[2][NX][1 + NV];
+    double left[2 * NX][2 * NX], moved[2 * NX][1 + NV], f[2][NX][1 + NV], all;
     int i, j, k, p, q;
     FOR(p, 2) {
         double at = t + MPC_PERIOD * mpc_nodes[p], A[ROOM(NZ * NZ)];
@@ -193,7 +193,8 @@ static int mpc_linearise(const double *x, const double *w, const double *u, doub
     }
     mpc_convex(to->H);
     if (MPC_END) mpc_cost(1, to->T[1], NY, mpc_every, end_H, end_g, to->end_H, to->end_g);
-    return 1;
+    for (i = 0, all = 0; i < (int)(sizeof *to / sizeof(double)); i++) all += 0 * ((const double *)to)[i];
+    return isfinite(all);
 }
 
 /* ---- The program of the horizon: see horizon_qp.py, and moves.py for what is added to its stages. */
@@ -387,14 +388,16 @@ static int mpc_factored(mpc_work *work, double ridge) {
 
 /* Solve the program of the stages from a first change of the state; 1 if it is solved. */
 static int mpc_program(mpc_work *work, const double *first) {
-    double largest = 1e-300, left = 1, mean = 1, missed = 0, step;
+    double largest = 1e-300, slope = 0, ridge = MPC_RIDGE, left = 1, mean = 1, missed = 0, step;
     int i, j, k, n, turn;
     FOR(n, N) FOR(i, NE) FOR(j, NE) largest = fmax(largest, fabs(work->stages[n].H[i][j]));
     FOR(i, NQ) FOR(j, NQ) largest = fmax(largest, fabs(work->end_P[i][j]));
+    FOR(n, N) FOR(i, NE) slope = fmax(slope, fabs(work->stages[n].g[i]));
+    if (largest < 1e-6 * slope) ridge *= largest / slope, largest = slope; /* as good as linear */
     FOR(i, NQ) {
         work->end_p[i] /= largest;
         FOR(j, NQ) work->end_P[i][j] /= largest;
-        work->end_P[i][i] += MPC_RIDGE;
+        work->end_P[i][i] += ridge;
     }
     FOR(n, N) {
         mpc_stage *s = &work->stages[n];
@@ -405,7 +408,7 @@ static int mpc_program(mpc_work *work, const double *first) {
         s->penalty = MPC_PENALTY / largest;
         FOR(k, NI) s->s[k] = s->lambda[k] = 1, s->aim[k] = 0;
     }
-    if (!mpc_factored(work, MPC_RIDGE)) return 0;
+    if (!mpc_factored(work, ridge)) return 0;
     mpc_direction(work, first);
     FOR(n, N) FOR(k, NI) {
         mpc_stage *s = &work->stages[n];
@@ -415,7 +418,7 @@ static int mpc_program(mpc_work *work, const double *first) {
     memcpy(work->end_v, work->end_to, sizeof work->end_v);
     FOR(turn, MPC_TURNS) {
         double reached, share;
-        if (NI && !mpc_factored(work, MPC_RIDGE)) break;
+        if (NI && !mpc_factored(work, ridge)) break;
         FOR(n, N) FOR(k, NI) work->stages[n].aim[k] = 0;
         mpc_direction(work, first);
         step = mpc_longest(work), mean = mpc_mean(work, 0), reached = mpc_mean(work, step);
@@ -472,6 +475,7 @@ static int mpc_later(controller_state *it, double *x, double t) {
     mpc_linear linear;
     int i, turn;
     memcpy(w, it->plan.w[0], sizeof w);
+    FOR(i, NX) w[i] = w[NX + NZ + i] = x[i];
     FOR(turn, 12) if (!(change < 1e-10)) {
         if (!mpc_linearise(x, w, it->applied, t, it->known, &linear)) return 0;
         change = 0;
@@ -505,10 +509,19 @@ static int mpc_load(controller_state *it, double t) {
     return 1;
 }
 
+/* Whether a loaded plan can go on from state x; see PlannedMotion.near. */
+static int mpc_near(const controller_state *it, const double *x) {
+    double off = 0, size = 0, begin = 0, given = 0;
+    int i, k;
+    FOR(k, N) FOR(i, NW) off = fmax(off, fabs(it->work.unknowns[k][i][0])), size = fmax(size, fabs(it->plan.w[k][i]));
+    FOR(i, NX) begin = fmax(begin, fabs(it->plan.x[0][i])), given = fmax(given, fabs(x[i]));
+    return off < 1 + size && begin < MPC_APART * (1 + given);
+}
+
 /* The plan changed by the solution of the loaded program from state x; the largest change of an input or state, below 0 without solution. */
 static double mpc_change(controller_state *it, const double *x) {
     mpc_work *work = &it->work;
-    double first[NQ] = {0}, change = 0;
+    double first[NQ] = {0}, change = 0, all = 0;
     int i, j, k, m;
     FOR(i, NX) first[i] = x[i] - it->plan.x[0][i];
     if (!mpc_program(work, first)) return -1;
@@ -526,7 +539,12 @@ static double mpc_change(controller_state *it, const double *x) {
         FOR(i, NU) it->plan.u[k][i] += by[1 + NX + i];
     }
     FOR(i, NX) it->plan.x[N][i] += work->end_v[i], change = fmax(change, fabs(work->end_v[i]));
-    return change;
+    FOR(k, N) {
+        FOR(i, NW) all += 0 * it->plan.w[k][i];
+        FOR(i, NU) all += 0 * it->plan.u[k][i];
+    }
+    FOR(k, N + 1) FOR(i, NX) all += 0 * it->plan.x[k][i];
+    return isfinite(all) ? change : -1;
 }
 
 void controller_init(controller_state *state) {
@@ -540,7 +558,7 @@ void controller_init(controller_state *state) {
 void controller_step(controller_state *state, const controller_real *given, controller_real *found) {
     controller_state *it = state;
     double x[NX], kept[NU], change = 0, t;
-    int i, turn, begun, solved = 1;
+    int i, turn, on, begun, solved = 1;
     if (!it->ready) controller_init(it);
     t = it->steps * MPC_PERIOD, begun = it->begun, it->lost = 0;
     it->steps += 1;
@@ -556,9 +574,12 @@ void controller_step(controller_state *state, const controller_real *given, cont
     if (begun) mpc_shift(it);
     memcpy(kept, it->plan.u[0], sizeof kept);
     it->before = it->plan;
-    if (solved) FOR(turn, begun ? MPC_ITERATIONS : MPC_FIRST) {
-        change = mpc_load(it, t) ? mpc_change(it, x) : -1;
-        if (change < MPC_STANDS) break;
+    if (solved) for (on = begun, change = -1; change < 0 && on >= 0; on--) {
+        if (begun && !on) mpc_guess(it, x); /* the plan before leads nowhere: a first one */
+        FOR(turn, on ? MPC_ITERATIONS : MPC_FIRST) {
+            change = mpc_load(it, t) && (turn || !on || mpc_near(it, x)) ? mpc_change(it, x) : -1;
+            if (change < MPC_STANDS) break;
+        }
     }
     solved &= change >= 0;
     if (!solved) it->plan = it->before;

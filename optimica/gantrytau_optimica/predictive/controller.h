@@ -1,7 +1,7 @@
 /* @NAME@: predictive controller, one step every @PERIOD@ s, a horizon of @PERIODS@. From gantrytau.
  *
  * Memory that is all zeros is a controller before its first step, which makes a first plan in up to @FIRST@ iterations of the
- * method; each further step takes @ITERATIONS@. No heap, no file, no global that changes.
+ * method; each further step takes @ITERATIONS@, or makes a first plan again where the one before leads nowhere. No heap, no file, no global that changes.
  */
 #ifndef CONTROLLER_H
 #define CONTROLLER_H
@@ -44,7 +44,8 @@ typedef struct { double x[MPC_N + 1][MPC_NX], w[MPC_N][MPC_NW], u[MPC_N][MPC_NU]
 typedef struct {
     mpc_plan plan, before;
     double applied[MPC_NU], known[MPC_ROOM(MPC_NK)];
-    int ready, begun, steps; /* steps: until now, of which each is a period of time */
+    double steps; /* until now, of which each is a period of time */
+    int ready, begun;
     int lost, failed;        /* the last step: a measurement was not finite; there was no solution, the plan before holds */
     mpc_work work;
 } controller_state;

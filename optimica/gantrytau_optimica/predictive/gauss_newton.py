@@ -80,7 +80,7 @@ class GaussNewton:
         limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
         finite = np.hstack([np.isfinite(stages.rows), limits])
         rows = np.append(soft, limits[0] & False)
-        self._program = HorizonProgram(elements, nx, stages.nu, rows, finite, penalty)
+        self._program = HorizonProgram(elements, nx, stages.nu, rows, finite, penalty, size=stages.curvature)
 
     def reset(self) -> None:
         """No inputs are applied yet."""

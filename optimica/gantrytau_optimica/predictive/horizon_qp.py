@@ -57,7 +57,7 @@ class HorizonProgram:
     """The program for one number of stages, solved again and again.
 
     soft (rows,): which rows of a stage are; finite (2, rows): whether they have a lower and an upper end; ridge: of the
-    largest curvature, added to all.
+    largest curvature, added to all; size: of costs, which the solver sees by it.
     """
 
     def __init__(
@@ -69,8 +69,10 @@ class HorizonProgram:
         finite: np.ndarray,
         penalty: float,
         ridge: float = RIDGE,
+        size: float = 1.0,
     ):
-        self.stages, self.nx, self.nu, self.penalty, self.ridge = stages, nx, nu, penalty, ridge
+        self.stages, self.nx, self.nu, self.penalty, self.ridge = stages, nx, nu, penalty / size, ridge
+        self._size = size
         self.slack = bool(soft.any())
         self.each = nx + nu + self.slack
         # a soft row is one for each of its ends
@@ -90,14 +92,14 @@ class HorizonProgram:
     def load(self, stage: Stage, P: np.ndarray, p: np.ndarray) -> None:
         """Hand the solver all but the first state. P, p: of the last one."""
         n, nx, nu, each, slack = self.stages, self.nx, self.nu, self.each, self.slack
-        ridge = self.ridge * max(
-            float(np.abs(stage.H).max(initial=0.0)), float(np.abs(P).max(initial=0.0)), 1e-300
-        )
+        P, p = P / self._size, p / self._size
+        largest = max(float(np.abs(stage.H).max(initial=0.0)) / self._size, float(np.abs(P).max(initial=0.0)))
+        ridge = self.ridge * max(largest, 1e-300)
         H = np.zeros((n, each, each))
-        H[:, : nx + nu, : nx + nu] = stage.H
+        H[:, : nx + nu, : nx + nu] = stage.H / self._size
         H[:, range(each), range(each)] += ridge
         g = np.zeros((n, each))
-        g[:, : nx + nu] = stage.g
+        g[:, : nx + nu] = stage.g / self._size
         M = np.zeros((n, nx, each + nx))
         M[:, :, :nx], M[:, :, nx : nx + nu], M[:, :, each:] = stage.A, stage.B, -np.eye(nx)
         kept = np.concatenate([self.hard, self.below, self.above])
@@ -142,6 +144,8 @@ class HorizonProgram:
         self._solver.update(x_l=self._ends[0], x_u=self._ends[1])
         status = self._solver.solve()
         v = np.array(self._solver.result.x)
+        if not np.isfinite(v).all():
+            self._solver = None  # what it keeps from call to call is none any more
         parts = v[: n * each].reshape(n, each)
         x = np.vstack([parts[:, :nx], v[n * each :]])
         return Found(

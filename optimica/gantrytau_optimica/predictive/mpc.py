@@ -39,6 +39,7 @@ from gantrytau_optimica.problem.optimization import Optimization
 
 Status = Literal["solved", "not converged", "late", "lost", "failed"]
 PENALTY = 1e3  # times the largest curvature of the objective
+PASSED = 1e-6  # of the size of a limit: less is rounding
 MOST = 50  # iterations of the first plan, and of `converged`
 
 
@@ -155,7 +156,7 @@ class Mpc:
         What is not finite is taken as the plan foretold it, and `.status` says "lost". ModelError for names that are no
         states, and for a first measurement that is not finite.
         """
-        begin = time.perf_counter()
+        begin, t = time.perf_counter(), number(self.name, "t", t, unit="s")
         (x, lost), reached = self._state(measured), True
         if self.delay:
             x, reached = self._later(x, t)
@@ -172,7 +173,7 @@ class Mpc:
         self._newton.applied = np.clip(held, self.stages.lower_u, self.stages.upper_u)
         self._missed += late
         if found.solved:
-            self.softened = self._passed(found.slack)
+            self.softened = self._passed(found.slack, found.plan)
         words: dict[Status, bool] = {
             "failed": not found.solved,
             "late": late,
@@ -197,8 +198,7 @@ class Mpc:
             else:
                 plan = self._plan.shifted(t, self.period)
                 loaded = self._newton.load(plan)
-            # how far the unknowns are from solving their equations, beside what they are
-            near = loaded is not None and loaded.missed < 1.0 + np.abs(plan.w).max()
+            near = loaded is not None and plan.near(loaded.missed, x)
             if near and (found := self._newton.improved(plan, loaded, x, self.iterations)).solved:
                 return found, found.stands or not self._converged
         found = self._begun(self._first(x, t), x)
@@ -287,7 +287,7 @@ class Mpc:
         """The controller as C without heap, for boards and FMUs: `.write(folder)`. Its first step is at time 0.
 
         It gives the inputs of `step` without a deadline, from the state, then what `.estimated` names; what is not finite is
-        foretold, or kept; no plan is made anew, and the first one is not made by Ipopt.
+        foretold, or kept; first plans are not made by Ipopt.
         ModelError for courses, and for terminal="lqr" with a state of rest that moves.
         """
         unknown = self._first(np.full(self.stages.nx, np.nan), self.delay * self.period)
@@ -332,10 +332,13 @@ class Mpc:
 
     def _later(self, x: np.ndarray, t: float) -> tuple[np.ndarray, bool]:
         """The state a period later with the inputs held that are applied now, and whether the motion goes there."""
-        plan = self._first(x, t)
-        for begin in (plan if self._plan is None else self._plan, plan):
+        plan, nx = self._first(x, t), self.stages.nx
+        known = plan if self._plan is None else self._plan
+        still = known.w[0].reshape(2, -1).copy()
+        still[:, :nx] = x
+        for begin in (still.ravel(), known.w[0], plan.w[0]):
             with suppress(ModelError):
-                return self.stages.moved(x, begin.w[0], self._newton.applied, t)[self.stages.last], True
+                return self.stages.moved(x, begin, self._newton.applied, t)[self.stages.last], True
         return x, False
 
     def _first(self, x: np.ndarray, t: float) -> PlannedMotion:
@@ -355,7 +358,9 @@ class Mpc:
             raise ModelError(words, place=self.name, found=Given("hard", unknown[0]))
         return np.array([name not in hard for name in names], dtype=bool)
 
-    def _passed(self, slack: np.ndarray) -> tuple[str, ...]:
-        """Words of the soft limits, where the plan passes one."""
-        passed = zip(self.stages.row_names, self._yielding & np.any(slack > 1e-6), strict=True)
-        return tuple(dict.fromkeys(name for name, so in passed if so))
+    def _passed(self, slack: np.ndarray, plan: PlannedMotion) -> tuple[str, ...]:
+        """Words of the soft limits that the plan passes; others may only touch, by linearisation beyond them a little."""
+        if not (most := slack.max(initial=0.0)) > PASSED:
+            return ()
+        passed = self.stages.beyond(plan.w, plan.u, plan.t) > max(PASSED, 1e-3 * most)
+        return tuple(limit.name for limit, so in zip(self.stages.path, passed, strict=True) if so)

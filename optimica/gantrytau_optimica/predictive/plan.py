@@ -17,6 +17,8 @@ from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.predictive.horizon_qp import Found
 from gantrytau_optimica.predictive.stages import NODES, HorizonStages, Linear
 
+APART = 1e3  # times a measured state at which a plan begins that an outlier has spoilt
+
 
 @dataclass(frozen=True)
 class StepTimes(Record):
@@ -66,6 +68,13 @@ class PlannedMotion:
     def without_stages(self) -> "PlannedMotion":
         """The plan with the unknowns of its last stage alone, to be kept."""
         return replace(self, w=self.w[-1:].copy())
+
+    def near(self, missed: float, x: np.ndarray) -> bool:
+        """Whether it can go on from a state (nx,): its unknowns miss their equations by little, beside what they are, and it
+        begins not far beyond the state.
+        """
+        begin, given = (np.abs(one).max(initial=0.0) for one in (self.x[0], x))
+        return bool(missed < 1.0 + np.abs(self.w).max(initial=0.0) and begin < APART * (1.0 + given))
 
     def shifted(self, t: float, period: float) -> "PlannedMotion":
         """The plan from time t on, whole periods later; its last stage is repeated."""

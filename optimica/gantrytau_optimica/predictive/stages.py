@@ -69,27 +69,26 @@ class HorizonStages:
         return slice(self.nx + self.nz, 2 * self.nx + self.nz)
 
     @cached_property
-    def _curvatures(self) -> np.ndarray:
-        """Second derivatives of the integrand at the guess, by the signals that it has curvature in."""
+    def _slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Derivatives of the integrand at the guess, and second ones by the signals that it has curvature in."""
         x = np.array([s.guess(np.zeros(1))[0] for s in self.phase.states]) / self.sizes_x
         z = np.array([s.guess(np.zeros(1))[0] for s in self.phase.algebraics]).reshape(self.nz) / self.sizes_z
         zero = np.zeros(1)
-        return np.asarray(
-            self.point(np.concatenate([x, z, np.zeros(self.nu)]), 0.0, self.course_values(zero))[3]
-        )
+        found = self.point(np.concatenate([x, z, np.zeros(self.nu)]), 0.0, self.course_values(zero))
+        return np.asarray(found[2]), np.asarray(found[3])
 
     @property
     def input_curvatures(self) -> np.ndarray:
         """Second derivatives of the integrand by each input (nu,), scaled, at the guess."""
         found = np.zeros(self.nx + self.nz + self.nu)
-        found[self.costly] = np.diag(self._curvatures)
+        found[self.costly] = np.diag(self._slopes[1])
         return found[self.nx + self.nz :]
 
     @property
     def curvature(self) -> float:
-        """The largest curvature of the cost of a stage at the guess, 1 if there is none."""
-        largest = self.step * float(np.abs(self._curvatures).max(initial=0.0))
-        return largest if 0.0 < largest < np.inf else 1.0
+        """The largest curvature of the cost of a stage at the guess, or slope of one without, or 1."""
+        slope, curved = (self.step * float(np.abs(one).max(initial=0.0)) for one in self._slopes)
+        return next((one for one in (curved, slope) if 0.0 < one < np.inf), 1.0)
 
     def _of_input(self, limit: Limit, inputs: set[str]) -> bool:
         found = bare_limit(limit, self.phase)
@@ -176,6 +175,14 @@ class HorizonStages:
         """Signals (N, 2, x + z + u) at both points of stages, from their unknowns (N, nw) and inputs (N, nu)."""
         n = len(u)
         return np.concatenate([w.reshape(n, 2, -1), np.repeat(u[:, None], 2, axis=1)], axis=2)
+
+    def beyond(self, w: np.ndarray, u: np.ndarray, begin: float) -> np.ndarray:
+        """By how much a motion from some time on passes limits along the path at most, (path,), each by its size."""
+        t = begin + self.step * (np.arange(len(u))[:, None] + NODES).ravel()
+        y = self.points(w, u).reshape(2 * len(u), -1)
+        rows = self._at_points(y, t, self.course_values(t).T)[4].reshape(len(u), -1)
+        lower, upper = self.rows
+        return np.maximum(lower - rows, rows - upper).reshape(2 * len(u), -1).max(axis=0)
 
     def linear(self, x: np.ndarray, w: np.ndarray, u: np.ndarray, times: np.ndarray) -> Linear:
         """The horizon linearised at scaled x (N, nx), w (N, nw), u (N, nu); stages begin at times (N,) in s."""

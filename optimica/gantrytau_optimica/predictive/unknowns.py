@@ -213,6 +213,11 @@ def staged(
             "as in final_time = 1.0",
             place=read.name,
         )
-    if not any(phase.inputs for phase in found.phases):
-        raise ModelError("there is no input to choose; declare one as Input", place=read.name)
+    if not all(phase.inputs and phase.states for phase in found.phases):
+        words = (
+            "there is no input to choose; declare one as Input"
+            if found.phases[0].states
+            else "there is no state"
+        )
+        raise ModelError(words, place=read.name)
     return built, HorizonStages(found, period), estimates

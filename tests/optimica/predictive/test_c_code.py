@@ -79,6 +79,18 @@ class Filled(Optimization):
         yield self.valve.flow <= 0.7
 
 
+class Emptied(Optimization):
+    """As little as may be, with a cost without curvature."""
+
+    valve = Valve()
+
+    def integrand(self):
+        return 1e-3 * self.valve.level
+
+    def constraints(self):
+        yield self.valve.flow >= 0.4
+
+
 @pytest.mark.parametrize(
     ("problem", "keywords", "run"),
     [
@@ -99,8 +111,9 @@ class Filled(Optimization):
         ),
         (Ends, dict(period=0.05, elements=20), {}),
         (Filled, dict(period=0.1, elements=8, terminal="lqr"), {}),
+        (Emptied, dict(period=0.1, elements=8), {}),
     ],
-    ids=["noise", "delay", "moves", "end", "implicit"],
+    ids=["noise", "delay", "moves", "end", "implicit", "linear"],
 )
 def test_the_c_gives_the_inputs_of_python(problem, keywords, run, tmp_path):
     mpc = Mpc(problem, **keywords)
@@ -128,10 +141,21 @@ def test_what_is_measured_as_nothing_is_foretold_in_c_too(tmp_path):
     np.testing.assert_allclose(first, [[0.0], *given_by(mpc, states)], atol=2e-8)
 
 
+@pytest.mark.parametrize("delay", [0, 1])
+def test_a_plan_that_a_wrong_measurement_has_spoilt_is_made_anew_in_c(tmp_path, delay):
+    mpc = Mpc(Upright, period=0.05, elements=10, delay=delay)
+    code = Controller(mpc.c_code(), tmp_path)
+    for wild in (1e3, 1e9, -1e300):
+        states = np.array([[0.3, 0.2, 0.0, 0.0]] * 5)
+        states[2, 3] = wild
+        np.testing.assert_allclose(code.run(states)[4], given_by(mpc, states)[4], rtol=0.01)
+
+
 def test_estimates_are_given_behind_the_state_in_c(tmp_path):
     mpc = Mpc(Upright, period=0.05, elements=10, disturbance=["pole.f"], parameters=["pole.length"])
     code = mpc.c_code()
     assert code.given == (*mpc.states, *mpc.estimated)
+    assert (code.starts["pole.length"], code.starts["pole.p"]) == (0.5, 0.3)
     rows = np.array(
         [[0.3, 0.2, 0.0, 0.0, 0.5, 0.0], [0.25, 0.15, 0.0, 0.0, 0.6, 2.0], [0.2, 0.1, 0.0, 0.0, np.nan, 3.0]]
     )

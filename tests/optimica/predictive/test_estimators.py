@@ -96,6 +96,17 @@ def test_samples_that_never_came_are_lost_ones():
     assert found == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.parametrize("kind", [ExtendedKalman, MovingHorizon])
+def test_an_outlier_is_a_lost_sample_unless_it_goes_on(kind):
+    some, other = kind(Cart, **CART), kind(Cart, **CART)
+    for k, y in enumerate([1.0, 1.0, 1e9, 1.1, -1e300]):
+        found = some.step({"x": y}, {"u": 0.0})
+        wanted = other.step({"x": y if abs(y) < 2.0 else np.nan}, {"u": 0.0})
+        assert found == wanted
+        assert some.status == ("estimated" if abs(y) < 2.0 else "outlier"), k
+    assert [round(some.step({"x": 500.0}, {"u": 0.0})["x"]) for _ in range(2)][-1] > 100  # third in a row
+
+
 def swung(estimator, count=60, **changes):
     """What an estimator makes of a pendulum of 0.8 m, by an integrator of its own; deviations of the noise are 0.002."""
     random, x, u = np.random.default_rng(3), np.array([0.6, 0.0]), 0.0

@@ -156,6 +156,17 @@ def test_a_limit_that_is_passed_already_gives_way_and_is_named(upright):
     assert upright.softened == ("-2 <= pole.p <= 2",)
 
 
+def test_limits_that_hold_are_not_named_beside_one_that_is_passed():
+    class Kept(Upright):
+        def constraints(self):
+            yield from super().constraints()
+            yield self.pole.p <= 50
+
+    mpc = Mpc(Kept, period=0.05, elements=5)
+    mpc.step({"pole.p": 2.2, "pole.th": 0.0, "pole.v": 0.0, "pole.w": 0.0})
+    assert mpc.softened == ("-2 <= pole.p <= 2",)
+
+
 def test_a_delay_of_a_period_is_foretold():
     loop = Mpc(Upright, period=0.02, elements=60, delay=1).run(stop=2.0)
     assert abs(loop["pole.th"][-1]) < 0.02
@@ -224,6 +235,17 @@ def test_names_that_are_no_states_are_told(upright):
         upright.step({"pole.f": 1.0})
     with pytest.raises(ModelError, match=r"measured lacks pole\.th, pole\.v, pole\.w"):
         upright.step({"pole.p": 1.0})
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e12])
+def test_the_unit_of_the_objective_does_not_count(size):
+    class Sized(Upright):
+        def integrand(self):
+            return size * super().integrand()
+
+    state = {"pole.p": 0.3, "pole.th": 0.2, "pole.v": 0.0, "pole.w": 0.0}
+    given = [Mpc(one, period=0.05, elements=10).step(state)["pole.f"] for one in (Upright, Sized)]
+    assert given[1] == pytest.approx(given[0], rel=1e-6)
 
 
 def test_a_loop_goes_on_as_if_it_had_not_ended():

@@ -14,6 +14,7 @@ class ExtendedKalman(StateEstimator):
     parameters: name -> standard deviation of the value in the model; disturbance: input or measured output -> standard
     deviation of the change of its disturbance in a second, estimated as `disturbance(name)`.
     prior: name -> standard deviation of the start of a state, default its typical size; start: name -> start value.
+    gate: standard deviations of a sample from what was foretold beyond which it is an outlier, and counts as lost.
     Raises ModelError for wrong names, and for what the samples cannot determine, by name.
     """
 
@@ -42,6 +43,12 @@ class ExtendedKalman(StateEstimator):
         h, C, _ = one.shown.at(self._x[None], self._z[None], self._u[None], np.array([t]))
         self._x, self._P = corrected(self._x, self._P, y - h[0], C[0], one.r)
         return "estimated"
+
+    def _foretold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        return self._x, self._z, self._u, float(self._t or 0.0)
+
+    def _before(self) -> np.ndarray:
+        return self._P
 
     def _state(self) -> np.ndarray:
         return self._x

@@ -15,7 +15,12 @@ from typing import Any, Literal
 import numpy as np
 
 from gantrytau.border.checks import whole
-from gantrytau_optimica.predictive.estimators.state_estimator import EstimateStatus, StateEstimator, corrected
+from gantrytau_optimica.predictive.estimators.state_estimator import (
+    GATE,
+    EstimateStatus,
+    StateEstimator,
+    corrected,
+)
 from gantrytau_optimica.predictive.horizon_qp import FAR, HorizonProgram, Stage
 from gantrytau_optimica.predictive.stages import Linear
 
@@ -27,7 +32,7 @@ class MovingHorizon(StateEstimator):
     """A moving-horizon estimator of states, slow parameters and disturbances, within their limits.
 
     problem: an Optimization or a Model, class or instance; its `Free` parameters are estimated, too. period: s.
-    samples: the last ones that are looked at whole; measured, noise, parameters, disturbance, prior, start: as of
+    samples: the last ones that are looked at whole; measured, noise, parameters, disturbance, prior, start, gate: as of
     `ExtendedKalman`, which carries along what the samples before said.
     iterations: of Gauss-Newton's method at a step, or "converged".
     Raises ModelError for wrong names, and for what the samples cannot determine, by name.
@@ -46,6 +51,7 @@ class MovingHorizon(StateEstimator):
         prior: Mapping[str, Any] | None = None,
         start: Mapping[str, Any] | None = None,
         iterations: int | Literal["converged"] = "converged",
+        gate: float = GATE,
     ):
         self.samples = whole("MovingHorizon", "samples", samples, least=1)
         self._converged = iterations == "converged"
@@ -55,7 +61,7 @@ class MovingHorizon(StateEstimator):
         self._programs: dict[int, HorizonProgram] = {}
         super().__init__(
             problem, period=period, measured=measured, noise=noise, parameters=parameters, disturbance=disturbance,
-            prior=prior, start=start,
+            prior=prior, start=start, gate=gate,
         )  # fmt: skip
 
     def reset(self) -> None:
@@ -172,8 +178,17 @@ class MovingHorizon(StateEstimator):
     def _state(self) -> np.ndarray:
         return self._x[-1]
 
-    def _covariance(self) -> np.ndarray:
+    def _foretold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        return self._x[-1], self._z[-1], self._held[-1], float(self._times[-1])
+
+    def _carried_through(self) -> tuple[np.ndarray, np.ndarray]:
         m, P = self._mean, self._P
         for k in range(len(self._w)):
             m, P = self._carried(m, P, k)
-        return self._taken(m, P, len(self._w))[1]
+        return m, P
+
+    def _before(self) -> np.ndarray:
+        return self._carried_through()[1]
+
+    def _covariance(self) -> np.ndarray:
+        return self._taken(*self._carried_through(), len(self._w))[1]

@@ -1,5 +1,6 @@
 """What moving-horizon estimators and Kalman filters share: names, samples and inputs in, states out."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -15,7 +16,9 @@ from gantrytau_optimica.predictive.estimators.observed_model import Noise, Obser
 from gantrytau_optimica.predictive.estimators.recorded import recorded_estimates
 from gantrytau_optimica.predictive.unknowns import named_values
 
-EstimateStatus = Literal["estimated", "not converged", "lost", "failed"]
+EstimateStatus = Literal["estimated", "not converged", "outlier", "lost", "failed"]
+GATE = 100.0  # deviations between a sample and what was foretold: no model is that wrong, and lines spoil numbers by more
+ROW = 3  # samples in a row beyond the gate, of which the last is taken: what goes on is no outlier
 
 
 class StateEstimator(ABC):
@@ -32,8 +35,10 @@ class StateEstimator(ABC):
         disturbance: Mapping[str, Any] | None = None,
         prior: Mapping[str, Any] | None = None,
         start: Mapping[str, Any] | None = None,
+        gate: float = GATE,
     ):
         self.name = type(self).__name__
+        self.gate = number(self.name, "gate", gate, above=0.0, most=math.inf)
         self.period = number(self.name, "period", period, unit="s", above=0.0)
         said = Noise(measured, noise or {}, parameters or {}, disturbance or {}, prior or {})
         for argument, one in {
@@ -80,13 +85,15 @@ class StateEstimator(ABC):
         self.status: EstimateStatus | None = None
         self._t: float | None = None
         self._u = np.zeros(self.observed.stages.nu)
+        self._beyond = np.zeros(len(self.outputs), dtype=int)  # samples in a row beyond the gate
 
     def step(
         self, measured: Mapping[str, Any], inputs: Mapping[str, Any] | None = None, t: float | None = None
     ) -> dict[str, float]:
         """States, parameters and disturbances at time t in s, by name, in their units.
 
-        measured: samples at t, just before the inputs change; NaN is a lost one, and `.status` is "lost" if all are.
+        measured: samples at t, just before the inputs change; NaN is a lost one, and `.status` is "lost" if all are. One
+        beyond the gate counts as lost, unless it is the first or the third in a row, and `.status` is "outlier".
         inputs: all inputs as they were held since the step before; only a first step may leave them out.
         t: whole periods after the step before, which is the default of one; samples between were lost.
         Raises ModelError for other names, shapes and times, and for a first step without any sample.
@@ -105,13 +112,15 @@ class StateEstimator(ABC):
                 "found no finite sample at the first step, expected one at least", place=self.name
             )
         u, count = self._inputs(inputs), self._periods(t)
-        if self._t is None:
+        begun = self._t is not None
+        if not begun:
             self._begin(u, 0.0 if t is None else float(t))
         for _ in range(count):
             self._advance(u)
-        solved = self._correct(y)
+        outlier = self._outliers(y) if begun else np.zeros(len(y), dtype=bool)
+        solved = self._correct(np.where(outlier, np.nan, y))
         self._u = u
-        self.status = "lost" if lost else solved
+        self.status = "lost" if lost else "outlier" if outlier.any() and solved != "failed" else solved
         return one.in_units(self._state())
 
     def run(self, experiment: Experiment) -> Result:
@@ -121,6 +130,20 @@ class StateEstimator(ABC):
         its middle. Raises ModelError for other samples.
         """
         return recorded_estimates(self, experiment)
+
+    def _outliers(self, y: np.ndarray) -> np.ndarray:
+        """Which samples (ny,) lie beyond the gate, and are not the last of some in a row that do."""
+        x, z, u, t = self._foretold()
+        h, C, _ = self.observed.shown.at(x[None], z[None], u[None], np.array([t]))
+        with np.errstate(over="ignore"):
+            e = np.abs(y - h[0]) / self.observed.r
+        beyond = e > self.gate
+        if beyond.any():
+            C = C[0] / self.observed.r[:, None]
+            beyond &= e > self.gate * np.sqrt(1.0 + np.einsum("ij,jk,ik->i", C, self._before(), C))
+        self._beyond = np.where(beyond, self._beyond + 1, 0)
+        self._beyond[self._beyond == ROW] = 0
+        return self._beyond > 0
 
     def _inputs(self, inputs: Mapping[str, Any] | None) -> np.ndarray:
         """Scaled inputs (nu,)."""
@@ -158,6 +181,14 @@ class StateEstimator(ABC):
     @abstractmethod
     def _correct(self, y: np.ndarray) -> EstimateStatus:
         """Take a sample (ny,), NaN where it was lost."""
+
+    @abstractmethod
+    def _foretold(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """State, algebraics and inputs before the sample, scaled, and its time in s."""
+
+    @abstractmethod
+    def _before(self) -> np.ndarray:
+        """The covariance of the state before the sample (nx, nx), scaled."""
 
     @abstractmethod
     def _state(self) -> np.ndarray:
