@@ -35,12 +35,14 @@ def solve_levels(
     title: str,
     chosen: frozenset[str] = frozenset(),
     thorough: bool = False,
+    anew: bool = False,
 ) -> dict[str, float]:
     """Values that satisfy all levels, nearest to the given ones.
 
     values: a number for every symbol that occurs; held: names that must not move; started: names whose
     number somebody gave; chosen: of these those that are kept before the others; thorough: if they do not lead to a
-    solution, try others around them. Raises InitializationError with the worst residuals by name.
+    solution, try others around them; anew: begin again from what follows equation by equation. Raises
+    InitializationError with the worst residuals by name.
     """
     values = dict(values)
     for level in levels:
@@ -55,8 +57,10 @@ def solve_levels(
             try:
                 (_solve_anyhow if thorough else _solve)(level, moving, values, started, title)
             except InitializationError:
-                if not _follows(level, moving, values, chosen, started, title) and not _solve_switching(
-                    level, moving, values, started, title
+                if not (
+                    _follows(level, moving, values, chosen)
+                    or _solve_switching(level, moving, values, started, title)
+                    or (anew and _follows(level, moving, values, chosen, started, title))
                 ):
                     raise
     return values
@@ -87,13 +91,13 @@ def _follows(
     moving: Sequence[str],
     values: dict[str, float],
     chosen: frozenset[str],
-    started: frozenset[str],
-    title: str,
+    started: frozenset[str] | None = None,
+    title: str = "",
 ) -> bool:
     """Whether values follow from one another, equation by equation, once the starts of the model give way, as signals do.
 
     Steps of all at once go to and fro through what switches on what was just computed, and lead nowhere from the length 0
-    of a spring, by which its direction is divided; where equations are left, steps follow from the values found.
+    of a spring, by which its direction is divided. started: steps follow where equations are left, from the values found.
     """
     place = level.place
     given = np.array([values[n] for n in level.leaves])
@@ -103,6 +107,8 @@ def _follows(
     followed = {**values, **{n: float(found[place[n]]) for n in moving if n in place}}
     f, _ = level.look(found)
     if not np.all(np.abs(f) <= SOLVED * level.sizes(list(range(len(f))), found)):
+        if started is None:
+            return False
         try:
             _solve(level, moving, followed, started, title, propagate=False)
         except InitializationError:

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 
 import casadi as ca
 
@@ -70,7 +71,9 @@ def _consistent_start(
     if initial and free not in indexed.with_initial:
         indexed.with_initial[free] = _initial_level(flat, reduced, stages)
 
-    def led(levels: list[Level], chosen: frozenset[str], thorough: bool = False) -> dict[str, float]:
+    def led(
+        levels: list[Level], chosen: frozenset[str], thorough: bool = False, anew: bool = False
+    ) -> dict[str, float]:
         """Solve the levels, and then all of them with the initial equations."""
         values = solve_levels(
             levels,
@@ -80,9 +83,10 @@ def _consistent_start(
             chosen=chosen,
             title=title,
             thorough=thorough,
+            anew=anew,
         )
         whole = [indexed.with_initial[free]] if initial else []
-        return solve_levels(whole, values, held=fixed, started=guess.started, title=title)
+        return solve_levels(whole, values, held=fixed, started=guess.started, title=title, anew=anew)
 
     try:
         return led(stages, guess.chosen, not held)
@@ -94,9 +98,9 @@ def _consistent_start(
         # that follow it, and an initial equation to the first level
         attempts = [[]] if initial else []
         attempts += [[indexed.whole], *([_with_initial(flat, reduced, stages)] if initial else [])]
-        for levels in attempts:
+        for anew, levels in product((False, True), attempts):
             with contextlib.suppress(InitializationError):
-                return led(levels, frozenset())
+                return led(levels, frozenset(), anew=anew)
         raise (_with_nearest(error, stages, guess, started, title) if guess.fixed else error) from None
 
 
