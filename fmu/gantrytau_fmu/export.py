@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 import casadi as ca
+import numpy as np
 
 from gantrytau import Dae, Input, Model, Real, sampled, simulate, translate
 from gantrytau.answers.sampled_code import SampledCode
@@ -179,8 +180,16 @@ def _reference(
     dae: Dae, reference: Result | float | bool | None, about: Build, tolerance: float
 ) -> Result | None:
     """The reference results, simulated unless they are given."""
-    if reference is None or reference is False or isinstance(reference, Result):
-        return reference or None
+    if reference is None or reference is False:
+        return None
+    if isinstance(reference, Result):
+        for name, value in dae.parameter_values.items():
+            if name in reference and not np.allclose(was := reference[name][0], value, rtol=1e-12, atol=0.0):
+                words = f"found a result with {name} = {was:g}, expected that of the model, {value:g}; run it anew, or "
+                raise ModelError(
+                    f"{words}export the model with that value", place="export_fmu", argument="reference"
+                )
+        return reference
     if reference is True:
         said = about.experiment.stop if about.experiment else dae.flat.experiment.get("StopTime")
         reference = said or DefaultExperiment().stop

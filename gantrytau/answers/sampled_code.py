@@ -22,8 +22,8 @@ class SampledCode:
     real: Literal["double", "float"] = "double"
     units: Mapping[str, str] = field(default_factory=dict)
     starts: Mapping[str, float] = field(default_factory=dict)
-    header: str
-    source: str
+    header: str = field(repr=False)
+    source: str = field(repr=False)
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write `controller.h` and `controller.c` into a folder; their paths."""

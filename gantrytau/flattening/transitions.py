@@ -80,10 +80,11 @@ def _inside(placed: Placed, modes: dict[str, Placed]) -> Any:
         full = f"{placed.path}.{outer}" if placed.path else outer
         if full not in modes or full in [placed.name, *above]:
             free = [p for n, p in modes.items() if p.path == placed.path and n not in (placed.name, *above)]
-            beside = [f", as '{p.name.rpartition('.')[2]}.{p.declaration.names[0]}'" for p in free]
+            beside = [f"{p.name.rpartition('.')[2]}.{one}" for p in free for one in p.declaration.names]
+            near = did_you_mean(told, beside) if beside else "; declare one"
             raise ModelError(
                 f"{one.name}: found within={told!r}, expected a mode of another one beside it that is not within this "
-                f"one{beside[0] if beside else '; declare one'}"
+                f"one{near}"
             )
         one = modes[full]
         above.append(full)

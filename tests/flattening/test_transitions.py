@@ -102,7 +102,7 @@ def test_what_is_no_transition(words):
         ("inner.one", "within='inner.one'"),
         ("phase", "within='phase'"),
         ("phase.onn", "no mode 'onn'"),
-        ("mode.free", "that is not within this one, as 'phase.on'"),  # mode is within inner
+        ("mode.free", "that is not within this one; there is phase.on, phase.off."),  # mode is within inner
     ],
 )
 def test_modes_within_what_is_none(within, found):

@@ -3,6 +3,8 @@
 Where the explicit method needs too many steps, or something switches between two instants, the integrator takes over.
 """
 
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 
@@ -47,6 +49,14 @@ class Sampler:
         self.most = FIRST  # passages in the next call
         self.wait = self.waited = 0  # asked in vain, times, before and since the last trial
         self.passages = Passages(coordinates)
+
+    @cached_property
+    def _asks_inputs(self) -> bool:
+        """Whether the condition of a `when` may become true where inputs jump, so that it is asked behind each jump."""
+        c = self.coordinates
+        asked = {k for own in c.rounds.of for k in own}
+        margins = ca.vertcat(ca.SX(0, 1), *(c.switches.turns[k].margin for k in asked))
+        return bool(ca.depends_on(margins, ca.vertcat(c.w[: 2 * len(c.sampled), :], c.z)))
 
     @property
     def suits(self) -> bool:
@@ -114,7 +124,7 @@ class Sampler:
     def _last(self, trail: Trail, here: int) -> int:
         """The next place at which an integration ends, but for what is due or inputs that jump, or the last."""
         jumps = np.diff(trail.t[here + 1 :], append=np.inf) == 0
-        ends = trail.stops[here + 1 :] & ~jumps & ~trail.due[here + 1 :].any(axis=1)
+        ends = trail.stops[here + 1 :] & (self._asks_inputs | ~jumps) & ~trail.due[here + 1 :].any(axis=1)
         return here + 1 + int(np.argmax(ends)) if ends.any() else trail.last
 
     def _call(self, trail: Trail, here: int, last: int, step: float) -> tuple[int, bool]:

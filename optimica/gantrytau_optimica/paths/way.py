@@ -14,7 +14,7 @@ class Way(Model):
     """A point that moves along a path, whose way s is the state.
 
     path: a Path; further keywords modify members: v=Bounds(-0.5, 0.5), a=Bounds(-2.0, 2.0) limit speed and acceleration
-    along it. s has its limits at the ends of the path.
+    along it. s has its limits at the ends of the path, and starts in its middle unless told otherwise, as by s=Fixed(0.0).
     """
 
     s = Real(unit="m", description="way along the path", prefer=StateSelect.ALWAYS)

@@ -54,7 +54,8 @@ def doubt_samples(built: Built, period: float) -> None:
         said = f"{pole.real:.3g}" if pole.imag == 0.0 else f"{pole.real:.3g} +- {abs(pole.imag):.3g}j"
         warnings.warn(
             f"{built.read.name}: found samples every {period:g} s, expected at most {1 / abs(pole):.2g} s for the pole "
-            f"{said} 1/s of the model at its start, which else runs away between them; take a shorter period",
+            f"{said} 1/s of the model at its start, which else {'runs away' if pole.real > 0 else 'swings'} between them; "
+            "take a shorter period",
             DoubtfulResult,
             stacklevel=3,
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from gantrytau import Result
 from gantrytau.describing.record import Record
-from gantrytau.simulation.to_result import labels
+from gantrytau.simulation.to_result import displays, labels
 from gantrytau_optimica.answers.answer import Answer
 from gantrytau_optimica.control.built import Built
 from gantrytau_optimica.control.control_problem import Signal
@@ -147,5 +147,5 @@ def motion_result(
     values = np.asarray(named(signals.T, later[None, :], stages.course_values(later)))
     units, words = labels(built.read.dae)
     own: Any = dict(units=units, descriptions=words, title=title, shapes=built.read.dae.flat.shapes)
-    own["held"] = [s.name for s in phase.inputs]
+    own |= dict(held=[s.name for s in phase.inputs], displays=displays(built.read.dae))
     return Result(times, dict(zip(names, values, strict=True)) | dict(told or {}), **own)

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 from gantrytau import (
     Discrete,
     Input,
+    Mode,
     Model,
     Parameter,
     Real,
@@ -24,6 +25,7 @@ from gantrytau import (
     simulate,
     sin,
     time,
+    transition,
     translate,
     when,
 )
@@ -317,3 +319,27 @@ def test_a_when_that_never_acts_leaves_the_sampling_to_explicit_steps(monkeypatc
     simulate(Idle(), stop=2.0)
     assert len(calls) < 20  # for 2,000 instants
     assert min(calls) > 0
+
+
+class Asked(Model):
+    """What asks of a held input: a count, a mode, and an input through an algebraic."""
+
+    go = Input(unit="1", start=0.0)
+    count, phase = Discrete(0, unit="1"), Mode("off", "run")
+    x, twice = Real(start=0.0, fixed=True), Real()
+
+    def equations(self):
+        yield der(self.x) == if_else(self.phase.is_in("run"), 1.0, 0.0)
+        yield self.twice == 2 * self.go
+        yield when(self.twice > 1.0, self.count == pre(self.count) + 1)
+        yield transition(self.phase, "off", "run", self.go > 0.5)
+        yield transition(self.phase, "run", "off", self.go < 0.5)
+
+
+@pytest.mark.parametrize("max_step", [None, 0.01])
+def test_what_asks_of_held_inputs_is_asked_where_they_jump(max_step):
+    go = Samples([0.0, 0.5, 1.95, 2.5], [0.0, 1.0, 0.0, 1.0], kind="constant")
+    result = simulate(Asked(), stop=3.0, inputs={"go": go}, points=31, max_step=max_step)
+    assert result.final("count") == 2
+    assert result.final("x") == pytest.approx(1.95, abs=1e-9)
+    assert result.at(1.0, "x") == pytest.approx(0.5, abs=1e-9)

@@ -45,7 +45,12 @@ def read_prior(prior: Mapping[str, Any] | None, start: Mapping[str, float]) -> d
         for n in matches:
             k = [m for m in matches if _vector(m) == _vector(n)].index(n)
             size = number(f"calibrate: deviation for '{name}'", "prior", _element(deviation, k), above=0.0)
-            found[n] = start[n] if value is None else _element(value, k), size
+            at = (
+                start[n]
+                if value is None
+                else number(f"calibrate: value for '{name}'", "prior", _element(value, k))
+            )
+            found[n] = at, size
     return found
 
 
@@ -53,6 +58,8 @@ def _vector(element: str) -> str:
     return element.rsplit("[", 1)[0] if element.endswith("]") else element
 
 
-def _element(value: Any, k: int) -> float:
+def _element(value: Any, k: int) -> Any:
+    if isinstance(value, str):
+        return value  # which is refused
     array = np.atleast_1d(np.asarray(value, dtype=float))
     return float(array[k] if array.size > 1 else array[0])

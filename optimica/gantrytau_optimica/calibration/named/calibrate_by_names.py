@@ -1,6 +1,6 @@
 """Named parameters of any robot from measured poses: fitted, and judged by what is left."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from gantrytau_optimica.calibration.named.named_calibration import NamedCalibrat
 from gantrytau_optimica.fitting.finding import DataRows, Finding, agreeing
 
 FAR = 0.02  # m, of typical places, that named parameters leave: more are other mistakes
+WORSE = 1.1  # times what held-out poses were off before a fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,25 @@ def calibrate_by_names(
         loss=loss,
         frame=frame,
     )
-    return replace(found, noise=_noise(found)).with_findings([*known.findings, *_judged(found)])
+    findings = [*known.findings, *_judged(found), *_no_better(found, x)]
+    return replace(found, noise=_noise(found)).with_findings(findings)
+
+
+def _no_better(found: NamedCalibration, start: np.ndarray) -> Iterator[Finding]:
+    """A finding where poses that were held out are farther from the fit than from what it began with."""
+    if not len(found.held_out):
+        return
+    data = replace(found.residuals, data=found.measurements.select(found.held_out), lever=1.0)
+    before, after = (
+        float(np.linalg.norm(data.poses(x)[:, :3], axis=1).mean()) for x in (start, found.minimum.x)
+    )
+    if after > WORSE * before:
+        yield Finding(
+            "no better",
+            found.held_out,
+            f"the held-out poses are {after * 1e6:.3g} um from the fit in the mean, and were {before * 1e6:.3g} um from "
+            "where it began; look at what is free, at numbers that are given, and at joints=",
+        )
 
 
 def _noise(found: NamedCalibration) -> float:

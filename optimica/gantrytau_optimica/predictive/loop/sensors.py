@@ -1,11 +1,12 @@
 """What a controller is told of a plant at a sample: its state with noise, or what an estimator makes of outputs."""
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from gantrytau import ModelError
+from gantrytau import DoubtfulResult, ModelError
 from gantrytau.border.checks import instance, number
 from gantrytau.border.refusal import Given
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
@@ -48,6 +49,14 @@ class Sensors:
             words = f"the estimator does not estimate {', '.join(lacking)}, which the controller takes"
             raise ModelError(
                 f"{words}; let both have the same problem, parameters= and disturbance=", place=mpc.name
+            )
+        unused = [name for name in estimator.parameters if name not in mpc.estimated]
+        if unused:
+            warnings.warn(
+                f"{mpc.name}: the controller does not take what is estimated of {', '.join(unused)}; name them in "
+                "Mpc(..., parameters=) or disturbance=",
+                DoubtfulResult,
+                stacklevel=5,
             )
         if estimator.period != mpc.period:
             words = f"the estimator has a period of {estimator.period:g} s, expected {mpc.period:g} s as the controller has"
