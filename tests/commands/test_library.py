@@ -10,7 +10,7 @@ from gantrytau_models import prototypes
 
 def test_the_library_lists_models_components_and_prototypes(answer):
     found = answer("library")
-    parts = {"prototypes", "cart_servos", "SerialWrist", "WithWrist", "PreslidingFriction"}
+    parts = {"prototypes", "cart_servos", "SerialWrist", "WithWrist", "WithRacks", "PreslidingFriction"}
     assert set(found["models"]) == set(gantrytau_models.__all__) - parts
     assert Prismatic.__doc__ is not None
     assert found["components"]["gantrytau.mechanics.multibody"]["Prismatic"] in Prismatic.__doc__
@@ -31,7 +31,12 @@ def test_what_is_listed_explains_itself(answer):
 def test_parts_of_robots_are_no_models_of_their_own(answer):
     found = answer("library")
     assert "F1WithWrist" in found["models"]
-    assert set(found["components"]["gantrytau_models"]) == {"SerialWrist", "WithWrist", "PreslidingFriction"}
+    assert set(found["components"]["gantrytau_models"]) == {
+        "SerialWrist",
+        "WithWrist",
+        "WithRacks",
+        "PreslidingFriction",
+    }
 
 
 def test_a_component_is_listed_where_it_is_at_home(answer):
