@@ -50,6 +50,10 @@ def references_of(fmu: FmuFile) -> Iterator[ReferenceResults | FmuFinding]:
         if MANIFEST in archive.names:
             yield from _listed(archive, fmu)
             return
+        if any(name.startswith(FOLDER) for name in archive.names):
+            yield FmuFinding(
+                "warning", f"found files in {FOLDER} but no {MANIFEST}, which lists them; {_AGAIN}"
+            )
     beside, inputs = (fmu.path.with_name(f"{fmu.path.stem}_{end}.csv") for end in ("ref", "in"))
     if beside.is_file():
         contents = [file.read_bytes() for file in (beside, inputs) if file.is_file()]

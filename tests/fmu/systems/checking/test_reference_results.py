@@ -117,6 +117,10 @@ def test_files_that_are_gone_or_of_other_equations_are_told(tank, tmp_path):
     assert lines == [
         f"warning: {MANIFEST} lists '{CSV}' as result, found no such file; ask its author for it again"
     ]
+    (line,) = told(
+        write_archive(path, {name: content for name, content in found.items() if name != MANIFEST})
+    )
+    assert line.startswith(f"warning: found files in {FOLDER} but no {MANIFEST}, which lists them")
     token = read_fmu(tank).token.encode()
     lines = told(write_archive(path, found | {MANIFEST: found[MANIFEST].replace(token, b"{other}")}))
     assert (
