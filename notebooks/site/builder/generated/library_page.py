@@ -25,7 +25,8 @@ MODELICAPATH=... REFERENCE_RESULTS=... make library-results ONLY=Modelica.Mechan
 
 Outcomes are kept, so that an interrupted run goes on; `AGAIN=1` runs all anew, `TIME_LIMIT=120` changes the limit of 60 s of
 processor time for an example. Where a signal leaves within the first hundredth of the run alone, the beginning is run again
-with output times that are as many. Times below are processor time: from text to the integration, and the integration.
+with output times that are as many. Runs go on through singular poses (`singular="cross"`), as those of the reference did.
+Times below are processor time: from text to the integration, and the integration.
 
 Of libraries of others, without reference results, the examples are run and no more: those that came to the end of their
 annotation `experiment` "ran". `MODELICAPATH=folder:folder_of_Modelica make library-results ONLY=PlanarMechanics`.
