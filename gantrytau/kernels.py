@@ -151,7 +151,7 @@ def kernel(function: ca.Function, calls: float, wait: bool = False) -> ca.Functi
 
 
 def library(source: str) -> Path | None:
-    """A shared library of C, which is compiled now unless it is in the cache; None where it cannot be."""
+    """The path of a shared library of C source, compiled unless it is in the cache; None without a compiler or a cache."""
     command, folder = _command("-O3"), kernel_folder()
     if command is None or folder is None:
         return None

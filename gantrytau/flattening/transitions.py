@@ -73,14 +73,14 @@ def read_transitions(
 
 
 def _inside(placed: Placed, modes: dict[str, Placed]) -> Any:
-    """The condition that a mode is within the mode of another one that it names, None for one that is within none."""
+    """The condition under which a mode with `within=` may change; None without it."""
     one, above = placed, []
     while (told := one.declaration.within) is not None:
         outer = told.rpartition(".")[0]
         full = f"{placed.path}.{outer}" if placed.path else outer
         if full not in modes or full in [placed.name, *above]:
             free = [p for n, p in modes.items() if p.path == placed.path and n not in (placed.name, *above)]
-            beside = [f"{p.name.rpartition('.')[2]}.{one}" for p in free for one in p.declaration.names]
+            beside = [f"{p.name.rpartition('.')[2]}.{state}" for p in free for state in p.declaration.names]
             near = did_you_mean(told, beside) if beside else "; declare one"
             raise ModelError(
                 f"{one.name}: found within={told!r}, expected a mode of another one beside it that is not within this "

@@ -50,7 +50,7 @@ def check_references(
 
 
 def check_step(plant: Component, period: float) -> None:
-    """ModelError for an FMU that takes steps of one length only, which does not go into the period."""
+    """ModelError if the period is no multiple of the step of an FMU whose step is fixed."""
     step = None if plant.variable_step else plant.step
     if step and (period < step / 2 or abs(period - round(period / step) * step) > 1e-6 * step):
         words = f"found a period of {period:g} s and steps of {step:g} s, which alone {plant.file} takes"

@@ -259,7 +259,7 @@ def _held_by_equations(structure: Structure) -> Iterator[str]:
 
 
 def _held(structure: Structure) -> Iterator[str]:
-    """Names of what a `when`, or an equation that asks for values before, sets; all of a record that is set."""
+    """Names of variables that a `when` or an equation with `pre` sets; of a record all members."""
     around, name = structure.around, structure.path.rpartition(".")[2]
     if around is not None and structure.scope.definition.kind == "record" and name in set(_held(around)):
         yield from structure.names()

@@ -309,7 +309,7 @@ def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassSc
 
 
 def version_of(definition: tree.ClassDefinition, used: str = "") -> str:
-    """The version that a package says it has, or that it says it uses of another; "" where it says none."""
+    """The version of a package, or the version of another package that its `uses` asks for; "" where it says none."""
     arguments: Iterable[Any] = definition.annotation or ()
     value = None
     for name in (*(("uses", used) if used else ()), "version"):
