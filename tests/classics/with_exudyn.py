@@ -141,7 +141,7 @@ def by_exudyn(
     """
     try:
         import exudyn as exu  # pyright: ignore[reportMissingImports]
-        import exudyn.itemInterface
+        import exudyn.itemInterface  # pyright: ignore[reportMissingImports]
         import exudyn.utilities  # pyright: ignore[reportMissingImports]
     except ModuleNotFoundError:
         return ""
