@@ -16,9 +16,7 @@ def test_numbers_and_vectors(text, value):
 
 @pytest.mark.parametrize("text", ["x", "[1, a]", "[]", "'text'", "None", "nan", "{1: 2}", "(" * 300])
 def test_what_is_no_number(text):
-    with pytest.raises(
-        CommandError, match=r"--set m=.*: expected a number as 2.5, one with its unit as '700 mm', a vector"
-    ):
+    with pytest.raises(CommandError, match=r"--set m=.*: expected a number as 2.5, one with its unit as"):
         number("--set", "m", text)
 
 
@@ -28,9 +26,7 @@ def test_values_with_units_are_left_to_the_model(text):
 
 
 def test_what_is_no_value_with_a_unit_is_told_with_its_option():
-    with pytest.raises(
-        CommandError, match=r"^--set m=700 MM: unit 'MM': there is no unit 'MM'; did you mean"
-    ):
+    with pytest.raises(CommandError, match=r"^--set m=700 MM: unit 'MM': there is no unit 'MM'; did you"):
         number("--set", "m", "700 MM")
 
 

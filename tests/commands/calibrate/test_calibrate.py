@@ -218,10 +218,7 @@ def test_another_robot_and_too_few_poses(fails, measured, poses):
     [
         (("--prior", "length"), "--prior length: expected NAME=DEVIATION"),
         (("--prior", "length=0"), "the deviation above 0"),
-        (
-            ("--constraint", "length"),
-            "--constraint length: expected NAME=VALUE, NAME=[LEAST,MOST] or NAME=NAME",
-        ),
+        (("--constraint", "length"), "--constraint length: expected NAME=VALUE, NAME=[LEAST,MOST] or"),
         (("--constraint", "a=1", "--constraint", "a=2"), "found a twice"),
         (("--prior", "length=[1,2,3]"), "or NAME=[VALUE,DEVIATION]"),
         (("--output", __file__), "found a file, expected a folder"),
@@ -234,9 +231,7 @@ def test_options_that_cannot_be_used(fails, measured, poses, options, words):
 def test_what_is_no_table_of_poses(fails, measured, poses, tmp_path):
     assert "found no FILE, expected measurements" in fails(MISUSE, "calibrate", *ROBOT)
     for robot in (ROBOT, ()):  # without a robot too: a plan is not asked for beside a file that is not there
-        assert "nowhere.csv: there is no such file" in fails(
-            MISUSE, "calibrate", tmp_path / "nowhere.csv", *robot
-        )
+        assert "nowhere.csv: there is no such" in fails(MISUSE, "calibrate", tmp_path / "nowhere.csv", *robot)
 
 
 def test_without_a_robot_its_name_is_asked_for(fails, measured, poses):

@@ -284,10 +284,7 @@ def with_lists(**changes):
         (with_lists(derivatives=(Unknown("v", ("w",)),)), "unknown 'v': 'w': expected names of variables"),
         (with_lists(derivatives=(Unknown("v", ("s",), ()),)), "1 dependencies .* and 0 kinds"),
         (with_lists(derivatives=(Unknown("v", ("s", "s")),)), "each once"),
-        (
-            with_lists(derivatives=(Unknown("v", ("der(v)",)),)),
-            r"'v' depends on 'der\(v\)', which is no input, state",
-        ),
+        (with_lists(derivatives=(Unknown("v", ("der(v)",)),)), r"'v' depends on 'der\(v\)', which is no"),
         (with_kind(identifier="a b"), "'a b' is no C name"),
         (with_(interfaces=()), "expected 'model-exchange', 'co-simulation' or both"),
         (with_kind(kind="scheduled-execution"), "expected 'model-exchange'"),

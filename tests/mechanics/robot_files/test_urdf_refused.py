@@ -28,20 +28,11 @@ ARM = '<link name="base"/>' + link("arm")
         ("", "found no <link>, expected one or more"),
         (ARM, "found 2 links that no joint carries (base, arm), expected one, the base"),
         (ARM + joint("q", "hinge", "base", "arm"), "robot/joint[q]: found type 'hinge'"),
-        (
-            ARM + joint("q", "fixed", "base", "arms"),
-            "robot/joint[q]/child: found the link 'arms', expected a link that is there",
-        ),
+        (ARM + joint("q", "fixed", "base", "arms"), "robot/joint[q]/child: found the link 'arms', expected"),
         (ARM + joint("q", "fixed", "base", "arm") * 2, "found two joints of the name 'q'"),
         (ARM + ARM, "found two links of the name"),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0 0"/>'),
-            "robot/joint[q]/axis: found the axis 0 0 0",
-        ),
-        (
-            ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0"/>'),
-            'robot/joint[q]/axis: found xyz="0 0"',
-        ),
+        (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0 0"/>'), "robot/joint[q]/axis: found"),
+        (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0"/>'), "robot/joint[q]/axis: found"),
         (ARM + joint("q", "fixed", "base", "arm", '<origin xyz="0 nan 1"/>'), "expected 3 finite numbers"),
         (
             ARM + joint("q", "revolute", "base", "arm", '<limit lower="2" upper="1"/>'),
@@ -50,14 +41,8 @@ ARM = '<link name="base"/>' + link("arm")
         (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="p"/>'), "mimics 'p', expected a"),
         (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="q"/>'), "expected another one that"),
         (link("base") + joint("q", "fixed", "base", "base"), "found joints in a circle (q), expected a tree"),
-        (
-            '<link name="a"><inertial><mass value="-1"/></inertial></link>',
-            "robot/link[a]/inertial/mass: found -1 kg",
-        ),
-        (
-            '<link name="a"><inertial><inertia ixx="1"/></inertial></link>',
-            "robot/link[a]/inertial: found no <mass>",
-        ),
+        ('<link name="a"><inertial><mass value="-1"/></inertial></link>', "robot/link[a]/inertial/mass"),
+        ('<link name="a"><inertial><inertia ixx="1"/></inertial></link>', "robot/link[a]/inertial: found no"),
         ('<link name="a"><visual><geometry><cone/></geometry></visual></link>', "'cone', expected a shape"),
         ("<link/>", "robot/link: found <link> without name="),
         ('<xacro:macro xmlns:xacro="x" name="m"/>', "found macros of xacro, expected URDF"),
