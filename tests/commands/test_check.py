@@ -128,12 +128,6 @@ def test_a_name_that_is_no_model_of_the_file(fails, robots, name, message):
     assert message in fails(MISUSE, "check", f"{robots}{name}")
 
 
-def test_a_file_that_is_not_there(fails, robots):
-    message = fails(MISUSE, "check", f"{robots.parent / 'robot.py'}:Cart")
-    assert "robot.py: there is no such file; did you mean 'robots.py'?" in message
-    assert "there is no such file." in fails(MISUSE, "check", "no_such_folder/robot.py:Cart")
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

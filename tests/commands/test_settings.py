@@ -30,14 +30,6 @@ def test_what_is_no_value_with_a_unit_is_told_with_its_option():
         number("--set", "m", "700 MM")
 
 
-def test_a_unit_that_there_is_not_is_misuse_in_a_file_too(fails, tmp_path):
-    file = tmp_path / "values.toml"
-    file.write_text('m = "3 KG"\n')
-    message = fails(2, "check", "Pendulum", "--set", file)
-    assert "values.toml: m" in message
-    assert "no unit 'KG'" in message
-
-
 @pytest.mark.parametrize("text", ["m", "=2", "m=", "m= "])
 def test_what_is_no_setting(text):
     with pytest.raises(CommandError, match=r"expected NAME=VALUE, as --set m=2.5"):

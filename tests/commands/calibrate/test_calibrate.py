@@ -115,15 +115,6 @@ def test_values_say_of_which_prototype_they_are(run, measured, poses, tmp_path):
     assert "these are values" not in run("check", "GantryTau(L1)", "--set", values).stderr
 
 
-@pytest.mark.parametrize(
-    ("text", "words"), [("[[arms]]\nlenght = 2.0\n", "did you mean 'length'"), ("", "found no values")]
-)
-def test_files_of_values_that_cannot_be_used(fails, tmp_path, text, words):
-    file = tmp_path / "values.toml"
-    file.write_text(text)
-    assert words in fails(MISUSE, "check", "GantryTau(L1)", "--set", file)
-
-
 def spoilt(poses, how):
     """Rows with one of the usual mistakes."""
     rows = poses.copy()
