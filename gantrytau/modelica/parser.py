@@ -211,11 +211,8 @@ class Parser(EquationReader):
         elif alias is None and self.kind == "." and self.next_kind == "{":
             self.advance()
             self.advance()
-            listed = [self.expect("name")]
-            while self.take(","):
-                listed.append(self.expect("name"))
+            names = self.listed(lambda: self.expect("name"))
             self.expect("}")
-            names = tuple(listed)
         return tree.Import(at, *self.description(), name, alias, names)
 
     def extends_clause(self) -> tree.Extends:

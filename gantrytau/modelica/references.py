@@ -20,7 +20,7 @@ def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
         elif isinstance(one, (tuple, list)):
             left += reversed(one)
         elif isinstance(one, tree.TreeNode):
-            left += [getattr(one, name) for name in [*type(one).__slots__][::-1]]
+            left += [getattr(one, name) for name in one.own[::-1]]
 
 
 def from_left(e: tree.Binary) -> list[tree.Binary]:
