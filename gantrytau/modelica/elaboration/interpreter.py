@@ -17,7 +17,6 @@ from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
 from gantrytau.modelica.records.operators import operated
-from gantrytau.modelica.records.record_values import RecordValue
 from gantrytau.modelica.references import (
     Members,
     called_function,
@@ -55,14 +54,6 @@ class Surroundings(Protocol):
 def changed(new: Any, old: Any) -> Any:
     """Whether a Boolean, Integer or number of an enumeration is another one."""
     return logic_or(new > old + 0.5, new < old - 0.5)
-
-
-def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
-    """The components of a list, or of lists in it, at the places of each dimension."""
-    place, *rest = places
-    many = [place] if isinstance(place, int) else place
-    found = [_elements(components[k], rest) if rest else components[k] for k in many]
-    return found[0] if isinstance(place, int) else found
 
 
 def first_result(value: Any) -> Any:
@@ -255,33 +246,24 @@ class Interpreter:
         return self.library.package(owner).member(name), subscripts, rest
 
     def part(self, value: Any, name: str) -> Any:
-        """A member of a component or record, or of each in a list."""
-        if isinstance(value, list):
+        """A member of a component or record, or of each in an array."""
+        if isinstance(value, np.ndarray):
             return values.array([self.part(one, name) for one in value])
-        if isinstance(value, RecordValue):
-            known: Sequence[str] = [*value]
-            if name in value:
-                return value[name]
-        elif hasattr(value, "member"):
-            known = value.names()
-            if value.has(name):
-                return value.member(name)
-        else:
-            known = ()
+        if hasattr(value, "member") and value.has(name):
+            return value.member(name)
+        known = getattr(value, "names", tuple)()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
 
     def indexed(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
-        """The elements of an array or list that subscripts choose."""
+        """The elements of an array that subscripts choose."""
         if not subscripts:
             return value
         shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
-        if isinstance(value, np.ndarray) and value.size and any(map(self.varies, subscripts, shape)):
+        if value.size and values.is_plain(value) and any(map(self.varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
-        if isinstance(value, list):
-            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value

@@ -63,7 +63,7 @@ class PlacedMembers:
         if one is not None and (one.is_folded or one.is_object):
             return self.structure.member(name) if self.structure else None
         if one is not None and 0 in one.shape:
-            return np.empty(one.shape, dtype=object) if one.primitive else []
+            return np.empty(one.shape, dtype=object)
         found = getattr(
             self.instance,
             outer_name(name) if one is not None and {"inner", "outer"} <= one.prefixes else name,
@@ -72,7 +72,7 @@ class PlacedMembers:
             return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
         if isinstance(found, tuple):
             each = [PlacedMembers(each) for each in found]
-            return each if one is None else values.in_rows(each, one.shape)
+            return values.array(each) if one is None else values.in_rows(each, one.shape)
         return PlacedMembers(found) if isinstance(found, Declared) else found
 
     def shape(self, name: str) -> tuple[int, ...] | None:

@@ -149,26 +149,22 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
 
 def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
     """Two values that are equal, as expressions of the language."""
-    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        for one, other in zip(a, b, strict=True):
-            yield from pairs(one, other)
-        return
-    names, others = (_names(one) for one in (a, b))
-    if isinstance(a, list) or isinstance(b, list):
+    if values.all_sizes(a) != values.all_sizes(b):
         raise ModelError(
             f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
         )
+    if isinstance(a, np.ndarray) and not (values.is_plain(a) and values.is_plain(b)):
+        for one, other in zip(a.flat, b.flat, strict=True):
+            yield from pairs(one, other)
+        return
+    names, others = ([*one.names()] if hasattr(one, "member") else None for one in (a, b))
     if (names is None) != (others is None) or not {*(names or ())} <= {*(others or ())}:
         both = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
         raise ModelError(f"found {both} beside '=', expected two of one type")
     if names is not None:
         for name in names:
-            yield from pairs(_member(a, name), _member(b, name))
+            yield from pairs(a.member(name), b.member(name))
         return
-    if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
-        raise ModelError(
-            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
-        )
     if isinstance(a, np.ndarray) and not a.size:
         return
     left, right = values.to_casadi(a), values.to_casadi(b)
@@ -185,17 +181,6 @@ def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         yield left, right
 
 
-def _names(value: Any) -> list[str] | None:
-    """The members of a record; None for what is no record."""
-    if isinstance(value, values.RecordValue):
-        return [*value]
-    return [*cast(Members, value).names()] if hasattr(value, "member") else None
-
-
-def _member(value: Any, name: str) -> Any:
-    return value[name] if isinstance(value, values.RecordValue) else value.member(name)
-
-
 def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[Any]:
     try:
         a, b = reader.value(item.a), reader.value(item.b)
@@ -210,18 +195,14 @@ def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[An
 
 
 def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
-    many = [isinstance(x, list) for x in (a, b)]
-    if any(many):
-        if not all(many) or len(a) != len(b):
-            sizes = [f"[{len(x)}]" if isinstance(x, list) else "of a scalar" for x in (a, b)]
-            raise ModelError(f"found connectors of the sizes {' and '.join(sizes)}, expected one size")
-        for one, other in zip(a, b, strict=True):
-            yield from _ends(one, other)
-        return
-    if values.size_words(a) != values.size_words(b):
+    if values.all_sizes(a) != values.all_sizes(b):
         words = " and ".join(map(values.size_words, (a, b)))
         raise ModelError(f"found connectors of the sizes {words}, expected one size")
     if 0 in values.all_sizes(a):
+        return
+    if isinstance(a, np.ndarray) and not values.is_plain(a):
+        for one, other in zip(a.flat, b.flat, strict=True):
+            yield from _ends(one, other)
         return
     found = [getattr(x, "instance", None) if hasattr(x, "member") else values.to_casadi(x) for x in (a, b)]
     if any(x is None or isinstance(x, (bool, int, float, str)) for x in found):

@@ -67,7 +67,7 @@ class TextOptimization(ModelicaModel, Optimization):
             return 0.0
         scope, expression = found
         value = replace(self._reader(scope), instants=instants).value(expression)
-        if isinstance(value, (bool, str, list, np.ndarray)) or hasattr(value, "member"):
+        if isinstance(value, (bool, str, np.ndarray)) or hasattr(value, "member"):
             scope.refuse(expression.at, f"found {_kind(value)} as {name}, expected a number")
         return value
 
@@ -125,7 +125,7 @@ def _constraint(item: Any, reader: TimedInterpreter) -> Iterator[Any]:
 
 def _rows(relation: str, left: Any, right: Any) -> Iterator[Any]:
     """The scalars of a relation; one number may stand beside an array."""
-    if any(hasattr(side, "member") or isinstance(side, (list, str)) for side in (left, right)):
+    if not all(values.is_plain(side) and not isinstance(side, str) for side in (left, right)):
         raise ModelError(f"found a component or a text beside '{relation}', expected numbers")
     try:
         pairs = np.broadcast(values.boxed(left), values.boxed(right))

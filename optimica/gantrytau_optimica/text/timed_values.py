@@ -57,7 +57,7 @@ class TimedInterpreter(Interpreter):
             raise ModelError(f"found the variable '{name}' called, expected one time, as {name}(finalTime)")
         (when,) = call.arguments
         signal = replace(self, instants="may").value(call.function)
-        if hasattr(signal, "member") or isinstance(signal, (list, str)):
+        if isinstance(signal, str) or not values.is_plain(signal):
             raise ModelError(f"found the component '{name}' called with a time, expected a variable of it")
         if values.is_number(signal):
             return signal
