@@ -88,7 +88,7 @@ class Execution:
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
                 self._refuse_given(target, reader)
-                wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
+                wanted, whole = reader.members.structure.type_of(target), isinstance(value, tuple)
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
                     reader.scope.refuse(target.at, f"found {kind} for '{name}', expected {wanted}")
@@ -121,7 +121,7 @@ class Execution:
         name = target.parts[0][0]
         prefixes = reader.scope.elements[name].clause.prefixes if name in reader.scope.elements else ()
         given = next((word for word in ("input", "parameter", "constant") if word in prefixes), "")
-        if given == "input" or (given and reader.members.is_fixed(target)):
+        if given == "input" or (given and reader.members.structure.is_fixed(target)):
             words = f"found the {given} '{name}' assigned, expected a variable; assign to one of another name"
             reader.scope.refuse(target.at, words)
 
@@ -137,7 +137,7 @@ class Execution:
         self.known[name] = value
         reader = replace(self.reader, scope=element.scope, local={**self.reader.local, **self.known})
         sizes = [*element.declaration.subscripts, *element.clause.subscripts]
-        wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
+        wanted = reader.members.structure.type_of(tree.ComponentReference(0, ((name, ()),)))
         if not fits(wanted, kind := type_of_value(value)):
             raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
         if not any(isinstance(one, tree.Mark) for one in sizes) and not is_array_type(element):
@@ -228,7 +228,7 @@ def stated_by_algorithm(
     held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
     names = [n for n in dict.fromkeys(targets(items)) if n not in held]
     run = Execution(reader, {n: mapped(lambda _: None, reader.members.member(n)) for n in names})
-    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.shape(n))}
+    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.structure.shape(n))}
     run.known |= {n: reader.members.member(n) for n in held}
     old = {n: mapped(values.FUNCTIONS["pre"], one) for n, one in run.known.items() if n in held}
     for item in items:

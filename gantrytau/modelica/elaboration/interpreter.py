@@ -323,7 +323,7 @@ class Interpreter:
             instant = self.members.next_sample(e)
             return time >= instant if name == "sample" else instant > 0.5
         if name == "getInstanceName":
-            return self.members.instance_name
+            return self.members.structure.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if name == "pre" and before and (at := subscripts_at_end(e.arguments[0])):
             whole = self.value(replace(e, arguments=at[:1]))

@@ -119,7 +119,7 @@ def _joined(
 def _type_of_reference(e: tree.ComponentReference, reader: Interpreter) -> str:
     name = e.parts[0][0]
     if reader.members.has(name):
-        return reader.members.type_of(e)
+        return reader.members.structure.type_of(e)
     if name in reader.local:
         return type_of_value(reader.local[name])
     return "Real" if name == "time" else type_of_value(reader.value(e))

@@ -82,7 +82,7 @@ def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool 
 def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenChain]:
     """What makes a Boolean or Integer follow an expression that asks for values before."""
     left = cast(tree.ComponentReference, item.left)
-    taken, turn = reader.members.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
+    taken, turn = reader.members.structure.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
     now = sides(item, replace(reader, settled=True))
     waits = not remembers(item, reader.members)  # else a pulse of one round would have passed
     for (variable, right), (_, settled) in zip(sides(item, reader), now, strict=True):
@@ -90,7 +90,7 @@ def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenC
             chain = follows(settled, variable, turn, right)
             yield WhenChain(tuple(replace(one, waits=waits) for one in chain.branches))
             continue
-        if reader.members.type_of(left) == "Boolean":
+        if reader.members.structure.type_of(left) == "Boolean":
             test = values.condition(right)
             tests = [logic_not(test), test]
         else:
@@ -107,7 +107,9 @@ def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tre
     asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
     inside = {id(one) for one in asked}
     others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
-    return members.type_of(item.left) in ("Boolean", "Integer") and bool(others or item.left in asked)
+    return members.structure.type_of(item.left) in ("Boolean", "Integer") and bool(
+        others or item.left in asked
+    )
 
 
 def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
