@@ -23,6 +23,13 @@ def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
             left += [getattr(one, name) for name in one.own[::-1]]
 
 
+def inner_items(item: tree.EquationOrStatement) -> list[tree.EquationOrStatement]:
+    """The equations or statements in a loop, an `if` or a `when`; none in another one."""
+    if isinstance(item, tree.Branching):
+        return [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
+    return [*item.items] if isinstance(item, (tree.ForLoop, tree.WhileLoop)) else []
+
+
 def from_left(e: tree.Binary) -> list[tree.Binary]:
     """The operators of a sum, product or the like in the order of their values, those on the left side of another first.
 

@@ -16,7 +16,7 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope
-from gantrytau.modelica.elaboration.statements import action_of, looped, pairs
+from gantrytau.modelica.elaboration.statements import action_of, pairs
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
 from gantrytau.modelica.records.assigned import most_rounds, with_part
@@ -147,7 +147,7 @@ class Execution:
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
         outer = self.left["break"]
-        for inner in looped(item, reader):
+        for inner in reader.looped(item.iterators):
             steps = {name: inner.local[name] for name, _ in item.iterators}
             try:
                 self.run(item.items, {**local, **steps})

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, Self, cast
 
 import casadi as ca
 import numpy as np
@@ -79,7 +79,7 @@ class Interpreter:
     settled: bool = False
     following: frozenset[str] | None = None
 
-    def with_local(self, **values: Any) -> "Interpreter":
+    def with_local(self, **values: Any) -> Self:
         """The same with further iterators."""
         return replace(self, local={**self.local, **values})
 
@@ -100,9 +100,6 @@ class Interpreter:
         except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
-    def _stated(self, e: tree.Number | tree.BooleanLiteral) -> Any:
-        return e.value
-
     def _literal(self, e: tree.StringLiteral) -> str:
         plain = "\\" not in e.text
         return e.text if plain else e.text.encode("latin-1", "backslashreplace").decode("unicode_escape")
@@ -111,9 +108,6 @@ class Interpreter:
         if e.word != "end" or self.end is None:
             raise ModelError(f"found '{e.word}', expected a value")
         return self.end
-
-    def _unary(self, e: tree.Unary) -> Any:
-        return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
         above = from_left(e)
@@ -164,6 +158,13 @@ class Interpreter:
             inner = self.with_local(**{name: one})
             yield values.array(list(inner._iterated(item, others))) if others else inner.value(item)
 
+    def looped(self, iterators: Sequence[tree.Iterator]) -> "list[Self]":
+        """What reads the body of a loop, once for each value of its iterators."""
+        found = [self]
+        for name, over in iterators:
+            found = [inner.with_local(**{name: one}) for inner in found for one in inner.steps(over)]
+        return found
+
     def steps(self, over: tree.Expression | None) -> Sequence[Any]:
         """The values of an iterator."""
         if over is None:
@@ -179,9 +180,6 @@ class Interpreter:
         rows = [[np.atleast_1d(values.boxed(self.value(one))) for one in row] for row in e.rows]
         rows = [[one[:, None] if one.ndim == 1 else one for one in row] for row in rows]
         return np.concatenate([np.concatenate(row, axis=1) for row in rows], axis=0).astype(object)
-
-    def _subscripted(self, e: tree.Subscripted) -> Any:
-        return self.indexed(self.value(e.array), e.subscripts)
 
     def _outputs(self, e: tree.OutputList) -> Any:
         raise ModelError("found a list of outputs, expected one value; it stands left of '=' and ':=' only")
@@ -364,17 +362,17 @@ class Interpreter:
 
 
 _EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
-    tree.Number: Interpreter._stated,
+    tree.Number: lambda reader, e: e.value,
     tree.StringLiteral: Interpreter._literal,
-    tree.BooleanLiteral: Interpreter._stated,
+    tree.BooleanLiteral: lambda reader, e: e.value,
     tree.Mark: Interpreter._mark,
-    tree.Unary: Interpreter._unary,
+    tree.Unary: lambda reader, e: operated(e.operator, [reader.value(e.operand)], reader.library.call),
     tree.Binary: Interpreter._binary,
     tree.RangeExpression: Interpreter._range,
     tree.Conditional: Interpreter._conditional,
     tree.ArrayConstructor: Interpreter._array,
     tree.Matrix: Interpreter._matrix,
-    tree.Subscripted: Interpreter._subscripted,
+    tree.Subscripted: lambda reader, e: reader.indexed(reader.value(e.array), e.subscripts),
     tree.OutputList: Interpreter._outputs,
     tree.ComponentReference: Interpreter._reference,
     tree.Call: Interpreter._call,

@@ -55,7 +55,7 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
     elif isinstance(item, tree.ConnectEquation):
         yield from _connections(item, reader)
     elif isinstance(item, tree.ForLoop):
-        for inner in looped(item, reader):
+        for inner in reader.looped(item.iterators):
             yield from stated(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "when":
         yield from when_chains(item, reader, _actions)
@@ -122,14 +122,6 @@ def _is_discrete(item: Any, reader: Interpreter) -> TypeGuard[tree.SimpleEquatio
     left = item.left if isinstance(item, tree.SimpleEquation) else None
     members = type(cast(Any, reader.members).instance).members()
     return isinstance(left, tree.ComponentReference) and isinstance(members.get(left.parts[0][0]), Discrete)
-
-
-def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
-    """What reads the body of a loop, once for each value of its iterators."""
-    readers = [reader]
-    for name, over in item.iterators:
-        readers = [inner.with_local(**{name: one}) for inner in readers for one in inner.steps(over)]
-    yield from readers
 
 
 def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any, Any]]:
@@ -302,7 +294,7 @@ def _actions(items: Items, reader: Interpreter, inside: bool = False) -> Iterato
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):
-            for inner in looped(item, reader):
+            for inner in reader.looped(item.iterators):
                 yield from _actions(item.items, inner, inside)
         elif isinstance(item, tree.Branching) and item.word == "if":
             yield from _chosen(item, reader)

@@ -270,16 +270,8 @@ def _cat(axis: int, *parts: Any) -> Any:
     return np.concatenate([np.atleast_1d(boxed(one)) for one in parts], axis=axis - 1)
 
 
-def _cross(a: Any, b: Any) -> Any:
-    return array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
 def _skew(a: Any) -> Any:
     return array([array([0, -a[2], a[1]]), array([a[2], 0, -a[0]]), array([-a[1], a[0], 0])])
-
-
-def _square(value: Any) -> Any:
-    return np.diag(value) if isinstance(value, np.ndarray) else value
 
 
 def _truncated(x: Any) -> Any:
@@ -290,10 +282,6 @@ def _written(value: Any, *_: Any, **__: Any) -> str:
     if isinstance(value, EnumerationValue):
         return value.literal
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _differentiated(x: Any) -> Any:
-    return der(x) if isinstance(x, ca.SX) else 0.0
 
 
 PLAIN = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "sign")
@@ -326,18 +314,18 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "ones": lambda *sizes: _filled(1, *sizes),
     "fill": _filled,
     "identity": lambda n: np.eye(n, dtype=object),
-    "diagonal": _square,
+    "diagonal": np.diag,
     "linspace": lambda a, b, n: array([a + (b - a) * k / (n - 1) for k in range(n)]),
     "transpose": np.transpose,
-    "cross": _cross,
+    "cross": np.cross,
     "skew": _skew,
-    "outerProduct": lambda a, b: a[:, None] * b[None, :],
+    "outerProduct": np.outer,
     "vector": lambda value: np.ravel(boxed(value)),
     "matrix": lambda value: np.atleast_2d(boxed(value)) if len(all_sizes(value)) != 1 else value[:, None],
     "scalar": lambda value: value.item() if isinstance(value, np.ndarray) else value,
     "cat": _cat,
     "array": lambda *items: array(items),
-    "der": _elementwise(_differentiated),
+    "der": _elementwise(lambda x: der(x) if isinstance(x, ca.SX) else 0.0),
     "pre": _elementwise(lambda x: pre(x) if isinstance(x, ca.SX) else x),
     "edge": lambda b: logic_and(condition(b), logic_not(condition(pre(b)))),
     "change": lambda x: x != pre(x),

@@ -13,7 +13,6 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.classes import ModelicaModel
 from gantrytau.modelica.elaboration.placed import PlacedMembers
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
-from gantrytau.modelica.elaboration.statements import looped
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.text.timed_values import TimedInterpreter
 
@@ -109,8 +108,7 @@ def _constraint(item: Any, reader: TimedInterpreter) -> Iterator[Any]:
             )
         yield from _rows(item.relation, reader.value(item.left), reader.value(item.right))
     elif isinstance(item, tree.ForLoop):
-        for inner in looped(item, reader):
-            assert isinstance(inner, TimedInterpreter)
+        for inner in reader.looped(item.iterators):
             yield from _constraints(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "if":
         tests, chosen = reader.open_branches(item.branches, item.otherwise or ())
