@@ -235,7 +235,7 @@ def test_a_file_within_a_package_comes_before_it_and_names_the_class_of_its_name
         "end Lag;"
     )
     library = load_modelica(tmp_path / "use.mo", tmp_path / "lag.mo")
-    assert library.names == ("Lag.Lag", "Lag.Use")
+    assert library.names == tuple(library) == ("Lag.Lag", "Lag.Use")
     assert simulate(library["Lag.Use"](), stop=1.0)["x"][-1] == pytest.approx(np.exp(-2), rel=1e-7)
 
 

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -92,6 +92,9 @@ class ModelicaLibrary:
             _read_all(one)
             left += [inner for inner in one.classes.values() if inner.around is one]
         return tuple(sorted({one.name for one in left if one.definition.kind in self.kinds}))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
 
     def _found(self, name: str) -> ClassScope:
         return self.root.classes.get(name) or self.root.find_class(name, 0)
