@@ -300,10 +300,6 @@ def _skew(a: Any) -> Any:
     return array([array([0, -a[2], a[1]]), array([a[2], 0, -a[0]]), array([-a[1], a[0], 0])])
 
 
-def _square(value: Any) -> Any:
-    return np.diag(value) if isinstance(value, np.ndarray) else value
-
-
 def _truncated(x: Any) -> Any:
     return if_else(x >= 0, ca.floor(x), ca.ceil(x)) if isinstance(x, ca.SX) else int(x)
 
@@ -348,7 +344,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "ones": lambda *sizes: _filled(1, *sizes),
     "fill": _filled,
     "identity": lambda n: np.eye(n, dtype=object),
-    "diagonal": _square,
+    "diagonal": lambda value: np.diag(value) if isinstance(value, np.ndarray) else value,
     "linspace": lambda a, b, n: array([a + (b - a) * k / (n - 1) for k in range(n)]),
     "transpose": np.transpose,
     "cross": _cross,
@@ -386,6 +382,9 @@ def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any
         raise ModelError(f"found {name}(), which is not supported here; {REFUSED[name]}")
     if name not in FUNCTIONS:
         raise ModelError(f"found '{name}(', expected a function{did_you_mean(name, FUNCTIONS)}")
+    divisors = boxed(arguments[-1]).flat if name in ("div", "mod", "rem") else ()
+    if any(is_number(y) and _plain(y) == 0 for y in divisors):
+        raise ModelError(f"found {name}(..., 0), expected a divisor other than zero")
     try:
         return FUNCTIONS[name](*arguments, **named)
     except TypeError as error:
