@@ -67,13 +67,13 @@ def read_laws(
     found, known = [], {one.name for one in sampled}
     for path, model, number, one in stated:
         place = place_of(path, model, number)
-        names = [
+        sets, reads = (
             tuple(s.name for x in side for s in declared(x, symbols, place, "by_law", ("real", "output")))
             for side in (one.found, one.given)
-        ]
-        if odd := [name for side in names for name in side if name not in known]:
+        )
+        if odd := [name for name in (*sets, *reads) if name not in known]:
             raise ModelError(f"{place}: found {odd[0]} in by_law, expected sampled scalars; sample it")
-        found.append(SampledLaw(*names, one.law, path, model))
+        found.append(SampledLaw(sets, reads, one.law, path, model))
     return tuple(found)
 
 

@@ -57,11 +57,10 @@ def behind(result, name, count):
 def test_inputs_are_those_of_a_run(delay):
     mpc = controller(delay=delay)
     loop, kind = mpc.run(stop=1.0), in_a_model(mpc)
-    for _ in range(2):  # the second begins anew
-        found = simulate(kind(), stop=1.0, tolerance=1e-10)
+    for found in (simulate(kind(), stop=1.0, tolerance=1e-10) for _ in range(2)):  # the second begins anew
         np.testing.assert_allclose(behind(found, "sledge.f", 10), loop["sledge.f"][:10], atol=1e-9)
-    assert found["mpc_.step"][-1] == 11
-    assert not found["mpc_.status"].any()
+        assert found["mpc_.step"][-1] == 11
+        assert not found["mpc_.status"].any()
 
 
 def test_others_that_sample_beside_it_change_nothing():

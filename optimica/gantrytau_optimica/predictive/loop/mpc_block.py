@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
@@ -26,6 +26,10 @@ class MpcBlock(Model):
     period: float
     joined: tuple[str, ...]  # states and inputs
     ports: Mapping[str, str]  # name of a state, estimate or input of the problem -> its port
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...  # ports, by the problem
 
     def __getitem__(self, name: str) -> Any:
         """The port of a name of the controller's problem."""
