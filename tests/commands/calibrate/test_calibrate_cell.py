@@ -242,12 +242,8 @@ def test_interrupted_it_goes_on_where_it_was(planned, run, tmp_path, monkeypatch
 def test_options_that_the_file_of_a_cell_replaces(fails, folder, tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text(with_lines())
-    assert "found --robot, --model too; leave it out" in fails(
-        MISUSE, "calibrate", file, "--robot", "GantryTau(L1)", "--model", "1"
-    )
-    assert "leave --set and --prototype out" in fails(
-        MISUSE, "calibrate", measure(folder), "--set", "arms[0].length=2.0"
-    )
+    assert "found --robot" in fails(MISUSE, "calibrate", file, "--robot", "GantryTau(L1)", "--model", "1")
+    assert "leave --set and" in fails(MISUSE, "calibrate", measure(folder), "--set", "arms[0].length=2.0")
 
 
 def test_a_robot_of_a_file_is_found_from_the_folder_of_the_plan(folder, answer, tmp_path):

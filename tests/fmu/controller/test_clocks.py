@@ -44,9 +44,7 @@ def test_a_client_that_never_answers_is_named_after_a_while(plant, tmp_path):
     with pytest.raises(SolveError, match=r"controller: haptic did not answer sample 0 within 0.05") as error:
         controller.run(STOP, log=tmp_path / "log.jsonl")
     assert error.value.result.time.size == 1
-    assert (
-        "haptic did not answer" in json.loads((tmp_path / "log.jsonl").read_text().splitlines()[-1])["ended"]
-    )
+    assert "haptic did not" in json.loads((tmp_path / "log.jsonl").read_text().splitlines()[-1])["ended"]
     assert client.closed == 1
 
 

@@ -275,10 +275,7 @@ def with_lists(**changes):
         (with_variable(7, derivative="m"), "'share' is the derivative of 'm', expected a continuous"),
         (with_variable(6, derivative=None), r"'der\(v\)' is listed as a derivative, but of no state"),
         (with_variable(6, derivative="s"), "state 's' has two derivatives"),
-        (
-            with_variable(7, causality="independent", initial=None, start=None),
-            "found 2 independent variables",
-        ),
+        (with_variable(7, causality="independent", initial=None, start=None), "found 2 independent"),
         (with_lists(outputs=()), "'s', 'share': expected each output once"),
         (with_lists(derivatives=(Unknown("v", ()),) * 2), "'v' stands twice in the list of derivatives"),
         (with_lists(derivatives=(Unknown("v", ("w",)),)), "unknown 'v': 'w': expected names of variables"),

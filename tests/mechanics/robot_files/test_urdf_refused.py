@@ -34,10 +34,7 @@ ARM = '<link name="base"/>' + link("arm")
         (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0 0"/>'), "robot/joint[q]/axis: found"),
         (ARM + joint("q", "continuous", "base", "arm", '<axis xyz="0 0"/>'), "robot/joint[q]/axis: found"),
         (ARM + joint("q", "fixed", "base", "arm", '<origin xyz="0 nan 1"/>'), "expected 3 finite numbers"),
-        (
-            ARM + joint("q", "revolute", "base", "arm", '<limit lower="2" upper="1"/>'),
-            'lower="2" above upper="1"',
-        ),
+        (ARM + joint("q", "revolute", "base", "arm", '<limit lower="2" upper="1"/>'), 'lower="2" above'),
         (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="p"/>'), "mimics 'p', expected a"),
         (ARM + joint("q", "continuous", "base", "arm", '<mimic joint="q"/>'), "expected another one that"),
         (link("base") + joint("q", "fixed", "base", "base"), "found joints in a circle (q), expected a tree"),

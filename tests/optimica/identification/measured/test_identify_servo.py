@@ -254,11 +254,7 @@ def test_what_is_no_step_response(arguments, wrong):
             ModelError,
             "step 1 of 2 actuators beside step 0 of 1",
         ),
-        (
-            [StepResponse(T, JUMP, JUMP), StepResponse(2 * T, JUMP, JUMP)],
-            ModelError,
-            "step 1 every 0.008 s beside step 0 every 0.004 s",
-        ),
+        ([StepResponse(T, JUMP, JUMP), StepResponse(2 * T, JUMP, JUMP)], ModelError, "step 1 every 0.008 s"),
         ([StepResponse(T, JUMP, np.sin(300 * T))], IdentificationError, "of the motion of actuator 0"),
         ([StepResponse(T, JUMP, np.cumsum(JUMP))], IdentificationError, "does not come to an end of its"),
     ],
