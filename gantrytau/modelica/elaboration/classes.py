@@ -86,7 +86,7 @@ class TextClass(Declared):
         if not found:
             return cls
         old = cls.structure
-        above = Structure(old.scope, merged(plain(found), old.modifier), old.beyond, old.path)
+        above = Structure(old.scope, merged(plain(found), old.modifier), old.library, old.path)
         above.prepare()
         return class_of(above, cls)
 
@@ -120,7 +120,7 @@ class ModelicaConnector(TextClass, Connector):
 
         def residual(structure: Structure, one: Any, another: Any) -> Any:
             function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
-            found = structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            found = structure.library.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
             return to_casadi(found) if np.size(found) else ca.SX(0, 1)
 
         yield from closing(self, other, residual)
@@ -321,28 +321,24 @@ def _component(one: ClassMember) -> Any:
         return _opened(class_of(child), keywords_of(child, one.own, owner))
     found = Array(Declared, 0)
     found.shape = one.shape
+    first = _form(one.children[0]) if one.children else None
     for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
-        same = found.elements and not child_differs(one.children[0], child)
+        same = found.elements and _form(child) == first
         made: Any = found.component if same else class_of(child)
         found.component = found.component if found.elements else made
         found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 
-def child_differs(a: Structure, b: Structure) -> bool:
-    """Whether two elements of an array have different values of what shapes them."""
-    if a.members.keys() != b.members.keys():
-        return True  # expandable connectors
-    for name, one in a.members.items():
-        other = b.members[name]
-        if one.primitive is not None:
-            if one.is_folded and one.full.value is not None and str(_known(one)) != str(_known(other)):
-                return True
-        elif (one.present, one.shape) != (other.present, other.shape) or any(
-            child_differs(x, y) for x, y in zip(one.children, other.children, strict=True)
-        ):
-            return True
-    return False
+def _form(structure: Structure) -> list[Any]:
+    """What shapes an instance: elements of an array with equal forms are of one class."""
+    found: list[Any] = []
+    for name, one in structure.members.items():
+        if one.primitive is None:
+            found.append((name, one.present, one.shape, [*map(_form, one.children)]))
+        else:
+            found.append((name, str(_known(one)) if one.is_folded and one.full.value is not None else ""))
+    return found
 
 
 def _opened(cls: type[Any], keywords: Mapping[str, Any]) -> Any:

@@ -148,8 +148,11 @@ class ModelicaLibrary:
         named: Mapping[str, Any],
         holder: Members | None = None,
     ) -> Any:
-        """The value of a function, or of the constructor of a record; holder: of whose members its modifications speak."""
-        return called_class(scope, arguments, named, self, (self.package(scope), holder))
+        """The value of a function, several as a tuple, or of the constructor of a record.
+
+        holder: the instance of whose members modifications of the function speak.
+        """
+        return called_class(scope, arguments, named, self, holder)
 
 
 Library = TypeVar("Library", bound=ModelicaLibrary)

@@ -324,8 +324,9 @@ class ClassScope:
 
     def imported_literal(self, name: str) -> "tuple[ClassScope, str] | None":
         """The enumeration and the name of its value that an import, here or further out, means by a name."""
-        found = ((one, inner) for one, inner, _ in self.imports(name) if inner in (one.literals or ()))
-        return next(found, None) or (self.around.imported_literal(name) if self.around else None)
+        return next(
+            ((one, inner) for one, inner in self._places(name) if inner in (one.literals or ())), None
+        )
 
     def _check_imports(self, name: str) -> None:
         """TextError where two imports of one kind, of single names or of all names, make different things of a name."""
@@ -359,15 +360,20 @@ class ClassScope:
 
     def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
         """The component that a simple name means in a class around this one, and that class."""
+        for owner, inner in self._places(name):
+            if inner in owner.elements:
+                owner = owner.heir or owner
+                return owner, owner.elements[inner]
+        return None
+
+    def _places(self, name: str) -> Iterator[tuple["ClassScope", str]]:
+        """The classes in which a simple name may mean a constant, with its name there: here, by imports, further out."""
         here: ClassScope | None = self
         while here is not None:
             here._check_imports(name)
-            for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
-                if inner in owner.elements:
-                    owner = owner.heir or owner
-                    return owner, owner.elements[inner]
+            yield here, name
+            yield from ((owner, inner) for owner, inner, _ in here.imports(name))
             here = here.around
-        return None
 
     def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""

@@ -13,7 +13,7 @@ import numpy as np
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.buses.expandable import expand
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
+from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
 from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
@@ -33,7 +33,7 @@ class Structure(Members):
 
     scope: ClassScope
     modifier: Modifier
-    beyond: Surroundings
+    library: Any
     path: str = ""
     prefixes: frozenset[str] = frozenset()  # parameter or constant, of the record as a whole
     around: "Structure | None" = None
@@ -75,7 +75,7 @@ class Structure(Members):
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
-        return Interpreter(scope, members or self, self.beyond)
+        return Interpreter(scope, members or self, self.library)
 
     def folded(self, modifier: Modifier) -> Any:
         """The value of a modification."""
@@ -378,7 +378,7 @@ class ClassMember:
         if around is not None:
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [
-            Structure(kind, one, self.owner.beyond, path, prefixes, self.owner)
+            Structure(kind, one, self.owner.library, path, prefixes, self.owner)
             for one in self.full.of_elements(self.shape)
         ]
 
