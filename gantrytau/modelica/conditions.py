@@ -1,6 +1,6 @@
 """Conditions of `when` as they stand in a text, and what is asked for before an instant."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard
 
@@ -181,6 +181,15 @@ def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
             return [name]
         found.append(other)
     return found if before else [name]
+
+
+def bound_pulses(declared: Mapping[str, Any]) -> Iterator[tree.EquationOrStatement]:
+    """What the components of a class that are declared as `b = sample(...)` amount to; declared: by name."""
+    for name, one in declared.items():
+        said = one.declaration.modification
+        if said is not None and said.value is not None and is_call(said.value, "sample"):
+            left = tree.ComponentReference(said.at, ((name, ()),))
+            yield from with_pulses([tree.SimpleEquation(said.at, None, None, "=", left, said.value)])
 
 
 def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:

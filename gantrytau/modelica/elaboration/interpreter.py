@@ -16,7 +16,7 @@ from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
-from gantrytau.modelica.records.operators import operated
+from gantrytau.modelica.records.operators import called, operated
 from gantrytau.modelica.references import (
     Members,
     called_function,
@@ -293,7 +293,7 @@ class Interpreter:
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
             found = values.array(list(inner._iterated(e.arguments[0], e.iterators)))
-            return found if name == "array" else values.called(name, [np.ravel(found)], {})
+            return found if name == "array" else called(name, [np.ravel(found)], {}, self.library.call)
         if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
@@ -320,7 +320,7 @@ class Interpreter:
             raise ModelError(
                 f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
             )
-        return arguments[0] if name == "pure" else values.called(name, arguments, named)
+        return arguments[0] if name == "pure" else called(name, arguments, named, self.library.call)
 
     def _before(self, asked: str, e: tree.Expression) -> Any:
         """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""

@@ -352,6 +352,9 @@ def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any
         raise ModelError(f"found {name}(), which is not supported here; {REFUSED[name]}")
     if name not in FUNCTIONS:
         raise ModelError(f"found '{name}(', expected a function{did_you_mean(name, FUNCTIONS)}")
+    divisors = boxed(arguments[-1]).flat if name in ("div", "mod", "rem") else ()
+    if any(is_number(y) and _plain(y) == 0 for y in divisors):
+        raise ModelError(f"found {name}(..., 0), expected a divisor other than zero")
     try:
         return FUNCTIONS[name](*arguments, **named)
     except TypeError as error:

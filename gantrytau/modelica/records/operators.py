@@ -1,6 +1,7 @@
 """Operators on operator records (Modelica 3.6, chapter 14): the function of the record that an operator means."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.records.record_values import RecordValue
 
+SIGNS = {"sum": "+", "product": "*"}
 Call = Callable[[ClassScope, Sequence[Any], Mapping[str, Any]], Any]
 
 
@@ -35,6 +37,14 @@ def operated(sign: str, operands: Sequence[Any], call: Call) -> Any:
     if any(operator_record(one) is not None for one in operands):
         return overloaded(sign, operands, call)
     return values.unary(sign, *operands) if len(operands) == 1 else values.binary(sign, *operands)
+
+
+def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any], call: Call) -> Any:
+    """The value of a function of the language; sum and product of operator records by their operators."""
+    items = np.ravel(arguments[0]) if name in SIGNS and len(arguments) == 1 else ()
+    if len(items) and operator_record(items[0]) is not None:
+        return reduce(lambda a, b: overloaded(SIGNS[name], [a, b], call), items)
+    return values.called(name, arguments, named)
 
 
 def overloaded(sign: str, operands: Sequence[Any], call: Call) -> Any:
