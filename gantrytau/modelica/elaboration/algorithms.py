@@ -128,8 +128,8 @@ class Execution:
     def _check_shape(self, name: str, value: Any) -> None:
         shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
         if shape is not None and isinstance(value, plain) and np.shape(values.boxed(value)) != shape:
-            wanted = values.sized(np.empty(shape))
-            words = f"found {values.sized(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
+            wanted = values.size_words(np.empty(shape))
+            words = f"found {values.size_words(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
             raise ModelError(words)
 
     def declare(self, name: str, element: Element, value: Any) -> None:

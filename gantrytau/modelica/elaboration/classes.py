@@ -37,7 +37,7 @@ from gantrytau.modelica.conditions import (
     whens_in,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, annotated, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import ClassScope
@@ -349,19 +349,11 @@ def _opened(cls: type[Any], keywords: Mapping[str, Any]) -> Any:
 
 def experiment_of(structure: Structure) -> dict[str, float]:
     """The numbers of the annotation `experiment`."""
-    for one in structure.scope.definition.annotation or ():
-        if isinstance(one, tree.Argument) and one.name == "experiment" and one.modification is not None:
-            said = [
-                a for a in one.modification.arguments or () if isinstance(a, tree.Argument) and a.modification
-            ]
-            found = {a.name: a.modification.value for a in said if a.modification is not None}
-            reader = structure.interpreter(structure.scope)
-            return {
-                n: float(reader.value(v))
-                for n, v in found.items()
-                if isinstance(v, (tree.Number, tree.Unary))
-            }
-    return {}
+    said = annotated(structure.scope.definition.annotation, "experiment")
+    entries = [one for one in (said and said.arguments) or () if isinstance(one, tree.Argument)]
+    found = {one.name: one.modification.value for one in entries if one.modification is not None}
+    reader = structure.interpreter(structure.scope)
+    return {n: float(reader.value(v)) for n, v in found.items() if isinstance(v, (tree.Number, tree.Unary))}
 
 
 def _sections(instance: Any, initial: bool) -> Iterator[Any]:

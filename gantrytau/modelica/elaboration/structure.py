@@ -15,7 +15,14 @@ from gantrytau.modelica import tree
 from gantrytau.modelica.buses.expandable import expand
 from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
-from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
+from gantrytau.modelica.elaboration.modifiers import (
+    NOTHING,
+    Element,
+    Modifier,
+    is_false,
+    merged,
+    read_arguments,
+)
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
@@ -158,13 +165,18 @@ class Structure(Members):
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
-        here: Structure | None = self
-        for k, (name, _) in enumerate(reference.parts, 1):
+        one = self.component(reference)
+        return one if one is not None and one.primitive is not None else None
+
+    def component(self, reference: tree.ComponentReference) -> "ClassMember | None":
+        """The component to which a reference leads, a number of a record for what stands behind it; None without one."""
+        one: ClassMember | None = None
+        for name, _ in reference.parts:
+            here = self if one is None else one.sample
             one = here.members.get(name) if here is not None else None
             if one is None or one.primitive is not None:
-                return one
-            here = one.sample if k < len(reference.parts) else None
-        return None
+                break
+        return one
 
 
 @dataclass(eq=False)
@@ -221,8 +233,7 @@ class ClassMember:
 
     def _begun(self, said: Modifier) -> Modifier:
         """The same with the value that an initial equation gives to a parameter with `fixed = false`."""
-        fixed = said.inner.get("fixed", self.over.inner.get("fixed"))
-        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
+        free = is_false(said.inner.get("fixed", self.over.inner.get("fixed")))
         for section in self.owner.scope.sections if free and "parameter" in self.prefixes else ():
             for item in section.items if section.kind == "initial equation" else ():
                 if isinstance(item, tree.SimpleEquation) and isinstance(item.left, tree.ComponentReference):
@@ -286,9 +297,11 @@ class ClassMember:
     @cached_property
     def is_solved(self) -> bool:
         """Whether it is a parameter whose value initial equations determine: `fixed = false`."""
-        fixed = self.full.inner.get("fixed")
-        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
-        return free and "parameter" in self.prefixes and self.full.value is None
+        return (
+            is_false(self.full.inner.get("fixed"))
+            and "parameter" in self.prefixes
+            and self.full.value is None
+        )
 
     @cached_property
     def follows(self) -> bool:
