@@ -199,10 +199,9 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
-    if is_connector(structure):
-        return type(scope.definition.name, (kind,), body)
-    body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
-    body["annotated_experiment"] = experiment_of(structure)
+    if not is_connector(structure):
+        body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
+        body["annotated_experiment"] = experiment_of(structure)
     return type(scope.definition.name, (kind,), body)
 
 
