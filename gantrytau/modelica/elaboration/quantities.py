@@ -212,9 +212,7 @@ def refuse_free(one: ClassMember) -> None:
 
 def inside_optimization(structure: Structure) -> bool:
     """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
-    root = structure
-    while root.around is not None:
-        root = root.around
+    *_, root = structure.outward()
     return root is not structure and root.scope.definition.kind == "optimization"
 
 

@@ -3,6 +3,7 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -52,11 +53,8 @@ class Structure(Members):
     @cached_property
     def members(self) -> dict[str, "ClassMember"]:
         """Its components by name, also those that are absent."""
+        self.scope.check_modified(self.modifier)
         for name, one in self.modifier.inner.items():
-            redeclares_class = one.redeclared is not None and one.member_clause is None
-            if name not in self.scope.elements and not redeclares_class and one.scope is not None:
-                hint = did_you_mean(name, self.scope.elements)
-                one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
                 words = f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component"
@@ -75,9 +73,7 @@ class Structure(Members):
     @property
     def instance_name(self) -> str:
         """Its path behind the name of the whole model."""
-        root = self
-        while root.around is not None:
-            root = root.around
+        *_, root = self.outward()
         return f"{root.scope.definition.name}.{self.path}".rstrip(".")
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
@@ -91,9 +87,11 @@ class Structure(Members):
             found = self.interpreter(modifier.scope, modifier.node).value(found)
         return modifier.picked(found)
 
-    def _refused(self, said: Modifier, words: str) -> ModelError:
-        """The error of a modification, with its line where it stands in a text."""
-        return TextError(said.scope.source.told(said.at, words)) if said.scope else ModelError(words)
+    def outward(self) -> "Iterator[Structure]":
+        """The instance, and those of which it is a component, up to the whole model."""
+        yield self
+        if self.around is not None:
+            yield from self.around.outward()
 
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
@@ -121,7 +119,8 @@ class Structure(Members):
                 raise ModelError(f"found {found!r} for '{name}'{did_you_mean(literal, one.literals)}")
             return EnumerationValue(one.literals.index(literal) + 1, literal, one.primitive.name)
         if not fits(one.type_name, type_of_value(found)):
-            raise self._refused(one.full, f"found {found!r} for '{name}', expected {one.type_name}")
+            words, said = f"found {found!r} for '{name}', expected {one.type_name}", one.full
+            raise TextError(said.scope.source.told(said.at, words)) if said.scope else ModelError(words)
         if not is_number(found):
             raise ModelError(f"found the value of '{name}' to vary, expected one known at translation")
         if isinstance(found, (int, float)) and one.kind in ("Real", "Integer"):
@@ -385,10 +384,7 @@ class ClassMember:
             scope.refuse(clause.at, f"found a component of {kind.name}, {words}")
         path = f"{self.owner.path}.{self.name}".lstrip(".")
         prefixes = frozenset({"parameter", "constant", "flow"} & self.prefixes)
-        around: Structure | None = self.owner
-        while around is not None and around.scope.definition is not kind.definition:
-            around = around.around
-        if around is not None:
+        if any(one.scope.definition is kind.definition for one in self.owner.outward()):
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [
             Structure(kind, one, self.owner.library, path, prefixes, self.owner)
@@ -397,9 +393,7 @@ class ClassMember:
 
     def _inner(self) -> "ClassMember | None":
         """The component that an `outer` means."""
-        around = self.owner.around if "outer" in self.prefixes and "inner" not in self.prefixes else None
-        while around is not None:
-            if around.has(self.name) and "inner" in around.members[self.name].prefixes:
-                return around.members[self.name]
-            around = around.around
-        return None
+        if self.owner.around is None or "outer" not in self.prefixes or "inner" in self.prefixes:
+            return None
+        known = (one.members[self.name] for one in self.owner.around.outward() if one.has(self.name))
+        return next((one for one in known if "inner" in one.prefixes), None)
