@@ -84,19 +84,54 @@ def targets(items: Items) -> Iterator[str]:
 
 
 def joined_whens(items: Items) -> list[tree.EquationOrStatement]:
-    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first."""
+    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first.
+
+    What the former one sets alone, or does beside, stays a `when` before the chain.
+    """
     found: list[Any] = []
     for item in items:
         both = [one for one in (*found[-1:], item) if isinstance(one, tree.Branching) and one.word == "when"]
-        named = [frozenset(targets(inner)) for one in both for _, inner in one.branches]
-        values = [one.value for one in nodes_of(item) if isinstance(one, tree.Assignment)]
-        tests = [test for one in both for test, _ in one.branches]
-        reads = {one.parts[0][0] for one in references([values, tests])}
-        if len(both) == 2 and len(set(named)) == 1 and not reads & named[0]:
-            item = replace(both[1], branches=(*both[1].branches, *both[0].branches))
-            found.pop()
+        if len(both) == 2 and (parts := _parted(*both)) is not None:
+            alone, common = parts
+            found[-1:] = [replace(both[0], branches=alone)] if any(inner for _, inner in alone) else []
+            item = replace(both[1], branches=(*both[1].branches, *common))
         found.append(item)
     return found
+
+
+def _parted(first: tree.Branching, last: tree.Branching) -> tuple[Any, Any] | None:
+    """The branches of a `when` in an algorithm: what it sets alone, and what another one behind it sets as well.
+
+    None where there is nothing to join, or the two depend on each other.
+    """
+    own, others = (set(targets([one])) for one in (first, last))
+    shared = own & others
+    sure = [set(targets([i for i in items if isinstance(i, tree.Assignment)])) for _, items in last.branches]
+    each = [(one, set(targets([one]))) for _, items in first.branches for one in items]
+    mixed = any(names & shared and not names <= shared for _, names in each)
+    tests = [test for one in (first, last) for test, _ in one.branches]
+    if not shared or mixed or not all(shared <= names for names in sure):
+        return None
+    alone = any(not names & shared for _, names in each)
+    sampled = any(call for test, _ in first.branches for call in sample_calls(test))
+    read = [
+        one.value for one in nodes_of([last, first] if alone else last) if isinstance(one, tree.Assignment)
+    ]
+    if (alone and sampled) or _read_now([tests, read]) & own:
+        return None
+    return tuple(
+        tuple(
+            (test, tuple(i for i in items if bool({*targets([i])} & shared) is common))
+            for test, items in first.branches
+        )
+        for common in (False, True)
+    )  # type: ignore[return-value]
+
+
+def _read_now(e: Any) -> set[str]:
+    """Names of the variables of which an expression has another value than that before an instant."""
+    before = {id(one) for call in nodes_of(e) if is_call(call, "pre") for one in references(call.arguments)}
+    return {one.parts[0][0] for one in references(e) if id(one) not in before}
 
 
 def whens_in(structure: Any) -> Iterator[tree.Branching]:
