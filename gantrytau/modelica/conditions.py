@@ -130,7 +130,8 @@ def _parted(first: tree.Branching, last: tree.Branching) -> tuple[Any, Any] | No
 
 def _read_now(e: Any) -> set[str]:
     """Names of the variables of which an expression has another value than that before an instant."""
-    before = {id(one) for call in nodes_of(e) if is_call(call, "pre") for one in references(call.arguments)}
+    calls = [one for one in nodes_of(e) if isinstance(one, tree.Call) and is_call(one, "pre")]
+    before = {id(one) for call in calls for one in references(call.arguments)}
     return {one.parts[0][0] for one in references(e) if id(one) not in before}
 
 
@@ -233,6 +234,43 @@ def bound_pulses(declared: Mapping[str, Any]) -> Iterator[tree.EquationOrStateme
         if said is not None and said.value is not None and is_call(said.value, "sample"):
             left = tree.ComponentReference(said.at, ((name, ()),))
             yield from with_pulses([tree.SimpleEquation(said.at, None, None, "=", left, said.value)])
+
+
+def read_section(section: tree.ClassSection) -> tuple[str, tuple[tree.EquationOrStatement, ...]]:
+    """The kind and statements of a section; an algorithm whose assignments ask for their own values before is equations."""
+    items = tuple(with_pulses(one for one in section.items if not isinstance(one, tree.Element)))
+    each = [_assigned(one) for one in items] if section.kind == "algorithm" else []
+    names = [name for name, _ in each]
+    asked = {
+        whole_name(one.arguments[0])
+        for one in calls_before([value for _, value in each])
+        if is_call(one, "pre")
+    }
+    alone = "" not in names and len(set(names)) == len(names) and asked & {*names}
+    if not alone or any(_read_now(value) & {*names[k:]} for k, (_, value) in enumerate(each)):
+        return section.kind, items
+    left = [tree.ComponentReference(one.at, ((name, ()),)) for one, name in zip(items, names, strict=True)]
+    return "equation", tuple(
+        tree.SimpleEquation(one.at, None, None, "=", name, value)
+        for one, name, (_, value) in zip(items, left, each, strict=True)
+    )
+
+
+def _assigned(item: tree.EquationOrStatement) -> tuple[str, Any]:
+    """The name and the value of the one variable that an assignment, or each branch of an `if`, sets; "" for all else."""
+    if isinstance(item, tree.Assignment) and len(item.targets) == 1 and item.targets[0] is not None:
+        (name, subscripts), *rest = item.targets[0].parts
+        return ("", None) if subscripts or rest else (name, item.value)
+    if isinstance(item, tree.Branching) and item.word == "if" and item.otherwise:
+        branches = [*(items for _, items in item.branches), item.otherwise]
+        each: list[tuple[str, Any]] = [
+            _assigned(items[0]) if len(items) == 1 else ("", None) for items in branches
+        ]
+        if len({name for name, _ in each}) == 1:
+            *found, last = (value for _, value in each)
+            tests = (test for test, _ in item.branches)
+            return each[0][0], tree.Conditional(item.at, tuple(zip(tests, found, strict=True)), last)
+    return "", None
 
 
 def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:

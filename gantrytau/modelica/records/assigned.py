@@ -44,7 +44,7 @@ def most_rounds(item: tree.WhileLoop, reader: Interpreter) -> int | None:
                 and place.operator == "+"
                 and isinstance(place.right, tree.Number)
             )
-            if (place.left if shifted else place) in rising:
+            if (cast(tree.Binary, place).left if shifted else place) in rising:
                 whole = replace(node, parts=(*node.parts[:-1], (name, ())))
                 found.append(values.all_sizes(reader.value(whole))[axis])
     return min(found, default=None)
