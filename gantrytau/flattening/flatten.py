@@ -20,13 +20,21 @@ from gantrytau.flattening.flat_checks import (
 )
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip, When
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.instants import Events, read_delays, read_events, sides, with_sides, with_starts
+from gantrytau.flattening.instants import (
+    Events,
+    read_delays,
+    read_events,
+    read_laws,
+    sides,
+    with_sides,
+    with_starts,
+)
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, defining, inlined, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
 from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
-from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
+from gantrytau.language.events import Lawful, Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.self_description.appearance import Shape, shapes_of
@@ -63,6 +71,7 @@ class _Stated:
     ways: list[tuple[str, str, int, Branch | Root]] = field(default_factory=list)
     requirements: list[Requirement] = field(default_factory=list)
     events: list[tuple[str, str, int, Sampling | Sticking]] = field(default_factory=list)
+    laws: list[tuple[str, str, int, Lawful]] = field(default_factory=list)
     whens: list[tuple[str, str, int, WhenChain]] = field(default_factory=list)
     transitions: list[tuple[str, str, int, Transition]] = field(default_factory=list)
     modes: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -80,6 +89,8 @@ class _Stated:
             self.requirements.append(replace(statement, path=path, model=name))
         elif isinstance(statement, (Sampling, Sticking)):
             self.events.append((path, name, number, statement))
+        elif isinstance(statement, Lawful):
+            self.laws.append((path, name, number, statement))
         elif isinstance(statement, WhenChain):
             self.whens.append((path, name, number, statement))
         elif isinstance(statement, Transition):
@@ -179,8 +190,7 @@ def write_out(instance: Instance) -> FlatModel:
         before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
         delays=delays,
         ranges=_ranges(instance.symbols, spread),
-        modes=stated.modes,
-        **_said(instance),
+        **_said(instance, stated, sampled),
         shapes=_shapes(instance, absent),
     )
 
@@ -193,11 +203,16 @@ def _shapes(instance: Instance, absent: Mapping[str, str]) -> tuple[Shape, ...]:
     return tuple(shape for shape in found if not gone & set(shape.names))
 
 
-def _said(instance: Instance) -> dict[str, Any]:
+def _said(instance: Instance, stated: _Stated, sampled: Sequence[Sampled]) -> dict[str, Any]:
     """What the components say of themselves beside their equations."""
+    laws = read_laws(stated.laws, instance.symbols, sampled)
     unchecked = frozenset(path for path, one in instance.components if not one.checks_units)
     return dict(
-        rods=rods_of(instance.root), unchecked=unchecked, experiment=instance.root.annotated_experiment
+        rods=rods_of(instance.root),
+        unchecked=unchecked,
+        experiment=instance.root.annotated_experiment,
+        laws=laws,
+        modes=stated.modes,
     )
 
 

@@ -17,9 +17,9 @@ Call = Callable[[ClassScope, Sequence[Any], Mapping[str, Any]], Any]
 
 
 def operator_record(value: Any) -> ClassScope | None:
-    """The operator record that a value, or each value of a list, belongs to; None for another value."""
-    if isinstance(value, list):
-        return operator_record(value[0]) if value else None
+    """The operator record that a value, or each element of an array, belongs to; None for another value."""
+    if isinstance(value, np.ndarray):
+        return operator_record(value.flat[0]) if value.size else None
     holder = value if isinstance(value, RecordValue) else getattr(value, "structure", value)
     scope = getattr(holder, "scope", None)
     return _plain(scope) if scope is not None else None
@@ -58,11 +58,11 @@ def overloaded(sign: str, operands: Sequence[Any], call: Call) -> Any:
     if function is not None:
         return call(function, operands, {})
     plain = [k for k, one in enumerate(operands) if operator_record(one) is None]
-    arrays = [one for one in operands if isinstance(one, (list, np.ndarray))]
+    arrays = [one for one in operands if isinstance(one, np.ndarray)]
     if arrays and (len(operands) == 1 or len(arrays) == 1 or (sign in "+-" and _alike(arrays))):
         count = range(len(arrays[0]))
-        rows = [[one[k] if isinstance(one, (list, np.ndarray)) else one for one in operands] for k in count]
-        return [overloaded(sign, row, call) for row in rows]
+        rows = [[one[k] if isinstance(one, np.ndarray) else one for one in operands] for k in count]
+        return values.array([overloaded(sign, row, call) for row in rows])
     if plain and not arrays:
         (k,) = plain
         converted = [call(record, [one], {}) if j == k else one for j, one in enumerate(operands)]
