@@ -178,8 +178,8 @@ class Execution:
         """A `while` of varying length: its statements once for each possible round, each time under its condition."""
         count = most_rounds(item, reader)
         if count is None:
-            words = "found a loop whose length varies, expected 'while i < n' with a known n, a subscript i, and i := i + 1"
-            reader.scope.refuse(item.at, words)
+            words = "found a loop whose length varies, expected 'while i < n' with a known n and a subscript i, or"
+            reader.scope.refuse(item.at, f"{words} 'while a[i] < x', and i := i + 1 in it")
         once = tree.Branching(item.at, None, None, "if", ((item.condition, item.items),), None)
         outer = self.left["break"]
         for _ in range(count):

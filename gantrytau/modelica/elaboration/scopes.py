@@ -7,7 +7,7 @@ from typing import NoReturn, cast
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import bound_pulses, is_call, with_pulses
+from gantrytau.modelica.conditions import bound_pulses, is_call, read_section
 from gantrytau.modelica.elaboration.modifiers import (
     Element,
     Modifier,
@@ -266,8 +266,7 @@ class ClassScope:
         body = self.definition.body
         for one in body.sections if isinstance(body, tree.Composition) else ():
             if one.kind not in ELEMENT_SECTIONS:
-                items = tuple(with_pulses(i for i in one.items if not isinstance(i, tree.Element)))
-                found.append(StatementSection(one.kind, items, self))
+                found.append(StatementSection(*read_section(one), self))
         if pulses := tuple(bound_pulses(self.declared)):
             found.append(StatementSection("equation", pulses, self))
         return tuple(found)
