@@ -370,16 +370,17 @@ class Mpc:
         return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
-        """Which rows of a stage are soft."""
+        """Which slack a row of a stage has, that of its limit, or -1: it is hard."""
         names = self.stages.row_names
         if isinstance(hard, str):
             one_of("Mpc", "hard", hard, ("none", "all"))
-            return np.full(len(names), hard == "none")
+            hard = names if hard == "all" else ()
         unknown = [name for name in hard if name not in names]
         if unknown:
             words = f"expected some of {', '.join(dict.fromkeys(names)) or 'no limit'}{did_you_mean(unknown[0], names)}"
             raise ModelError(words, place=self.name, found=Given("hard", unknown[0]))
-        return np.array([name not in hard for name in names], dtype=bool)
+        soft = np.array([name not in hard for name in names[: len(names) // 2]], dtype=bool)
+        return np.tile(np.where(soft, np.cumsum(soft) - 1, -1), 2)
 
     def _passed(self, slack: np.ndarray, plan: PlannedMotion) -> tuple[str, ...]:
         """Words of the soft limits that the plan passes; others may only touch, by linearisation beyond them a little."""
