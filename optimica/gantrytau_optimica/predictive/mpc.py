@@ -106,7 +106,9 @@ class Mpc:
         checks.doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self.stages.curvature if penalty is None else penalty
-        self.moves = moves = Moves(self.stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        self.moves = moves = Moves(
+            self.stages, self.elements, rates or {}, step_penalty or {}, blocks, self.built.read.dae.flat.unit
+        )
         self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._newton = GaussNewton(self.stages, self.elements, soft, weight, moves, self.steady)
         self.terminal, self._penalty = self._newton.terminal, weight

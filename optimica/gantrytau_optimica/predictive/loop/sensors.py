@@ -35,7 +35,10 @@ class Sensors:
                     place="run",
                     found=Given("noise", name),
                 )
-            self._spread[self.names.index(name)] = number("run", f"noise[{name}]", value, least=0.0)
+            unit = mpc.built.read.dae.flat.unit(name)
+            self._spread[self.names.index(name)] = number(
+                "run", f"noise[{name}]", value, unit=unit, least=0.0
+            )
         self.random = np.random.default_rng(seed)
         self._estimates: list[dict[str, float]] = []
         if estimator is not None:
