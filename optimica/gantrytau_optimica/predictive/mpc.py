@@ -257,7 +257,7 @@ class Mpc:
         value, by default the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator:
         a MovingHorizon or an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by
         these names.
-        after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
+        after: a loop with the same model and estimator, to go on from where it ended, as if it had never ended.
         """
         sensors = Sensors(self, noise or {}, seed, estimator)
         self.recall(None)
@@ -297,10 +297,10 @@ class Mpc:
         """What a loop must have in common with this controller to go on with it."""
         return self.states, self.inputs, self.period, self.elements, self.delay
 
-    def resume(self, plan: PlannedMotion, applied: Mapping[str, float], times: StepTimes) -> None:
-        """Be as after the step that made a plan, with these inputs held."""
-        self._plan, self._prepared = plan, None
-        self._newton.applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
+    def resume(self, memory: Any, times: StepTimes) -> None:
+        """Be as after the steps that left this memory."""
+        self.recall(memory)
+        self.prepare()
         self._preparations, self._steps = list(times.preparation), list(times.step)
         self._missed = times.missed
 
