@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from gantrytau.border.refusal import told
-from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
+from gantrytau.flattening.attributes import expression, fixed_elements, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_checks import (
     refuse_absent,
@@ -118,6 +118,7 @@ def _stated(instance: Instance) -> _Stated:
         for number, statement in _statements(component.initial_equations, path, name):
             found.take(path, name, number, statement, initial=True)
         instance.symbols.ranges[:] = ranges  # what is asked at the start alone is not watched
+    found.initial += _fixed_starts(instance)
     samplings, chains, found.modes = read_transitions(found.transitions, instance)
     found.events += samplings
     found.whens += chains
@@ -306,6 +307,17 @@ def _bindings(instance: Instance) -> list[Equation]:
                     Equation(left, right, placed.name, "binding", 1, row if len(value) > 1 else None)
                 )
     return found
+
+
+def _fixed_starts(instance: Instance) -> Iterator[Equation]:
+    """Initial equations of the arrays of which some elements alone have fixed starts."""
+    for placed in instance.quantities:
+        fixed = [] if _is_parameter(placed) else fixed_elements(placed)
+        if any(fixed) and not all(fixed):
+            starts = expression(placed, "start") if "start" in placed.attributes else [ca.SX(0)] * len(fixed)
+            for row, (left, right) in enumerate(zip(scalars(placed.symbol), starts, strict=True)):
+                if fixed[row]:
+                    yield Equation(left, right, placed.name, "fixed start", 1, row)
 
 
 def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str, ...]:
