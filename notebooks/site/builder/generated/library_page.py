@@ -32,7 +32,7 @@ Of libraries of others, without reference results, the examples are run and no m
 annotation `experiment` "ran". `MODELICAPATH=folder:folder_of_Modelica make library-results ONLY=PlanarMechanics`.
 """
 PEER = """A sample, evenly spread over the names of each package, simulated by {name} on the same machine ({date}): the same
-start, stop, tolerance and output times, compared in the same tubes. Times are processor time, of all threads. {name} runs all
+start, stop, tolerance and output times, compared in the same tubes. Times are processor time of all threads. {name} runs all
 examples in one session, which keeps what it has read; here each has a process of its own, which reads what it needs.
 
 ```text
