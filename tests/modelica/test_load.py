@@ -302,6 +302,26 @@ def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
     np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)
 
 
+def test_some_elements_of_an_array_have_fixed_starts(tmp_path):
+    (tmp_path / "f.mo").write_text(
+        """model Halves Real x[2, 2](each start=1); equation der(x) = -x; end Halves;
+        model F
+          Halves h[2](x(start={{{1, 2}, {3, 4}}, {{5, 6}, {7, 8}}},
+            fixed={{{true, false}, {true, true}}, {{false, true}, {false, false}}}));
+        initial equation
+          sum(h[1].x) = 20; h[2].x[1, 1] = 9; h[2].x[2, :] = {h[1].x[1, 1], 0};
+        end F;
+        model G Real x[3](fixed={true, false}); equation der(x) = -x; end G;"""
+    )
+    library = load_modelica(tmp_path / "f.mo")
+    start = translate(library["F"]()).start
+    for k, wanted in ((1, [[1, 12], [3, 4]]), (2, [[9, 6], [1, 0]])):
+        found = [[start[f"h[{k}].x[{i},{j}]"] for j in (1, 2)] for i in (1, 2)]
+        np.testing.assert_allclose(found, wanted, atol=1e-9)
+    with pytest.raises(ModelError, match=r"x: fixed has shape \(2,\), expected \(3,\)"):
+        translate(library["G"]())
+
+
 def test_a_constraint_of_a_class_modifies_what_replaces_it(tmp_path):
     (tmp_path / "p.mo").write_text(
         """package P
