@@ -184,6 +184,21 @@ INSTANTS = """package Instants
     table := {{1, 2}, {3, 4}};
     table[place, :] := {time, 5};
   end Buffer;
+  function interpolated
+    input Real x, points[:, 2];
+    output Real y;
+  protected
+    Integer i;
+  algorithm
+    i := 1;
+    while x >= points[i + 1, 1] loop
+      i := i + 1;
+    end while;
+    y := points[i, 2] + (x - points[i, 1]) / (points[i + 1, 1] - points[i, 1]) * (points[i + 1, 2] - points[i, 2]);
+  end interpolated;
+  model Hat
+    Real y = interpolated(time, [0, 0; 1, 0; 2, 2; 3, 0; 4, 0]);
+  end Hat;
   model Turns "the place of what is changed varies, too"
     Integer count[3](each start = 0), k(start = 1), older(start = 0);
   algorithm
@@ -203,6 +218,22 @@ INSTANTS = """package Instants
       on := true;
     end when;
   end Button;
+  model Counter "what comes between two samples; both set count, the later one wins where both act"
+    discrete Integer count(start = 0), found(start = 0), every(start = 0);
+    Real next;
+  initial equation
+    next = 0.125;
+  algorithm
+    when time >= pre(next) then
+      next := time + 0.125;
+      count := pre(count) + 1;
+      every := pre(every) + 1;
+    end when;
+    when sample(0.5, 0.5) then
+      found := pre(count);
+      count := 0;
+    end when;
+  end Counter;
   model Sampled
     Integer n(start = 0), m(start = 0);
     Real last(start = -1);
@@ -237,6 +268,8 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
     assert [float(result.at(t, "row")) for t in (0.7, 1.7, 2.7)] == [2, 3, 3]
     assert [float(result.at(0.5, name)) for name in ("table[1,1]", "table[2,2]")] == [0.5, 4]
     assert [float(result.at(1.5, name)) for name in ("table[1,1]", "table[2,1]", "table[2,2]")] == [1, 1.5, 5]
+    hat = simulate(instants["Instants.Hat"](), stop=3.5)
+    np.testing.assert_allclose(hat.at(np.array([0.5, 1.25, 2.5, 3.5]), "y"), [0, 0.5, 1, 0], atol=1e-6)
     with pytest.raises(SolveError):
         simulate(instants["Instants.Buffer"](), stop=3.0, parameters={"shift": 2})
 
@@ -250,6 +283,13 @@ def test_the_value_before_an_instant_at_the_place_of_now(instants):
 def test_the_later_of_two_whens_of_an_algorithm_wins(instants):
     result = simulate(instants["Instants.Button"](), stop=3.9)
     assert [float(result.at(t, "on")) for t in (0.5, 1.5, 2.5, 3.5)] == [0, 1, 0, 1]
+
+
+def test_whens_of_an_algorithm_that_set_one_variable_alike_keep_the_others(instants):
+    result = simulate(instants["Instants.Counter"](), stop=1.2)
+    assert [float(result.at(t, "found")) for t in (0.4, 0.6, 1.1)] == [0, 3, 3]
+    assert [float(result.at(t, "count")) for t in (0.4, 0.6, 0.8, 1.1)] == [3, 0, 2, 0]
+    assert result.final("every") == 9
 
 
 def test_a_sample_that_starts_before_the_run_fires_at_its_next_instant(instants):
