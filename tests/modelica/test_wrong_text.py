@@ -142,11 +142,6 @@ MEANINGS = (  # where a wrong model would run: text, line and column, words
         "found 'x' declared differently in P.A and in Q.A",
     ),
     (
-        "model A\nprotected\n  Real p=1;\nend A;\nmodel M\n  A a[2];\n  Real x[2] = a.p;\nend M;",
-        "7:15",
-        "found 'p' behind a dot, which is protected in A, expected a public member",
-    ),
-    (
         "model M\n  Real x = mod(time, 0);\nend M;",
         "2:12",
         "found mod\\(..., 0\\), expected a divisor other than",

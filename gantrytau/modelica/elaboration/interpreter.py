@@ -248,12 +248,6 @@ class Interpreter:
         if isinstance(value, np.ndarray):
             return values.array([self.part(one, name) for one in value])
         if hasattr(value, "member") and value.has(name):
-            element = value.scope and value.scope.elements.get(name)
-            if element and element.protected:
-                words = f"found '{name}' behind a dot, which is protected in {value.scope.name}"
-                raise ModelError(
-                    f"{words}, expected a public member; declare a public variable of its value there"
-                )
             return value.member(name)
         known = getattr(value, "names", tuple)()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
