@@ -53,11 +53,11 @@ def outcome_of(reference: Reference, library: Path) -> Outcome:
             warnings.simplefilter("ignore")
             result = _run(made(), reference, reference.settings.get("StopTime"))
             spent = result.statistics.seconds
-            word, detail, last = _compared([result], reference) if compared else (RAN, "", -np.inf)
+            word, detail, last = compare([result], reference) if compared else (RAN, "", -np.inf)
             start, end = (float(result["time"][k]) for k in (0, -1))
             if start < last < start + BEGINNING * (end - start):
                 again = _run(made(), reference, start + 2 * (last - start))
-                word, detail, _ = _compared([result, again], reference)
+                word, detail, _ = compare([result, again], reference)
     except ModelError as error:
         word, detail = REFUSED, one_line(error).replace(f"{library}/", "")
     except GantryTauError as error:
@@ -82,7 +82,7 @@ def _run(model: Any, reference: Reference, stop: float | None) -> Any:
     )
 
 
-def _compared(results: Sequence[Any], reference: Reference) -> tuple[str, str, float]:
+def compare(results: Sequence[Any], reference: Reference) -> tuple[str, str, float]:
     """Whether all signals stay in their tubes, which leaves first, and the last time outside; results: of one motion."""
     found = reference.trajectories
     times = np.concatenate([one["time"] for one in results])

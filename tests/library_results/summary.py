@@ -50,12 +50,9 @@ def write_summary(
     found: Mapping[Reference, Outcome], versions: Mapping[str, str], sources: str, kept: Path = KEPT
 ) -> None:
     """The packages in the file of the site anew; those that were not run stay."""
-    tables: list[dict[str, Any]] = []
-    if kept.is_file():
-        tables = tomllib.loads(kept.read_text(encoding="utf-8")).get("package", [])
-    packages = {table["name"]: table for table in tables}
+    tables = _tables(kept)
     for package, outcomes in by_package(found).items():
-        packages[package] = {
+        tables["package"][package] = {
             "name": package,
             "date": datetime.date.today().isoformat(),
             "library": versions.get(package.partition(".")[0], ""),
@@ -64,11 +61,34 @@ def write_summary(
             "casadi": version("casadi"),
             "example": [_row(one) for one in outcomes],
         }
+    _write(tables, kept)
+
+
+def write_peer(name: str, peer: str, outcomes: Iterable[Outcome], kept: Path = KEPT) -> None:
+    """The sample that another program of the name and version simulated, in the file of the site."""
+    tables = _tables(kept)
+    date = datetime.date.today().isoformat()
+    tables["peer"][name] = {
+        "name": name,
+        "date": date,
+        "version": peer,
+        "example": [_row(one) for one in outcomes],
+    }
+    _write(tables, kept)
+
+
+def _tables(kept: Path) -> dict[str, dict[str, dict[str, Any]]]:
+    """Kind -> name -> table of the file."""
+    read = tomllib.loads(kept.read_text(encoding="utf-8")) if kept.is_file() else {}
+    return {kind: {table["name"]: table for table in read.get(kind, [])} for kind in ("package", "peer")}
+
+
+def _write(tables: Mapping[str, Mapping[str, Mapping[str, Any]]], kept: Path) -> None:
     text = HEAD
-    for name in sorted(packages):
-        table = dict(packages[name])
+    for kind, name in ((kind, name) for kind, named in tables.items() for name in sorted(named)):
+        table = dict(tables[kind][name])
         examples = table.pop("example")
-        text += "\n[[package]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in table.items())
+        text += f"\n[[{kind}]]\n" + "".join(f"{key} = {json.dumps(value)}\n" for key, value in table.items())
         rows = [", ".join(f"{key} = {json.dumps(value)}" for key, value in row.items()) for row in examples]
         text += "example = [\n" + "".join(f"  {{ {row} }},\n" for row in rows) + "]\n"
     kept.write_text(text, encoding="utf-8")

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.library_results.example import LEFT, NO_REFERENCE, PASSED, REFUSED, outcome_of
-from tests.library_results.references import references
-from tests.library_results.summary import write_summary
+from tests.library_results.example import LEFT, NO_REFERENCE, NOT_RUN, PASSED, REFUSED, outcome_of
+from tests.library_results.peer import SCRIPT, outcomes, sample
+from tests.library_results.references import Reference, references
+from tests.library_results.summary import write_peer, write_summary
 
 TIME = np.linspace(0, 10, 501)
 OWN = """package Own
@@ -59,8 +60,9 @@ def test_examples_are_passed_refused_or_without_a_reference(places, tmp_path):
     }
     assert "Missing" in next(what.detail for one, what in found.items() if one.name == "Own.Partly")
     write_summary(found, {"Own": "4.1.0"}, "digest", tmp_path / "kept.toml")
+    write_peer("rumoca", "0", found.values(), tmp_path / "kept.toml")
     write_summary({}, {}, "", tmp_path / "kept.toml")
-    assert (tmp_path / "kept.toml").read_text().count("word =") == 4
+    assert (tmp_path / "kept.toml").read_text().count("word =") == 8
 
 
 def test_a_wrong_trajectory_is_told_with_signal_and_time(places):
@@ -119,3 +121,47 @@ def test_an_example_in_a_process_of_its_own_prints_its_outcome(places):
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
     assert json.loads(done.stdout)["word"] == PASSED
+
+
+RUMOCA = """import math, os
+version = lambda: "0.1"
+class RumocaError(Exception): ...
+SimConfig = dict
+class Result(dict):
+    time = property(lambda self: self["time"])
+class Session:
+    def __init__(self, roots): ...
+    def loads(self, text, model):
+        if "Partly" in text: raise RumocaError("Missing")
+        if "Gone" in text: os.abort()
+        return self
+    def simulate(self, span, dt, config):
+        times = [dt * k for k in range(501)]
+        return Result(time=times, x=[math.exp(-t) for t in times])
+"""
+
+
+def test_a_peer_is_compared_in_the_same_tubes_and_started_again_where_it_ends(places, tmp_path):
+    library, results = places
+    script = tmp_path / "peer" / SCRIPT.name
+    script.parent.mkdir()
+    script.write_text(SCRIPT.read_text())
+    (script.parent / "rumoca.py").write_text(RUMOCA)
+    asked = [one for one in references(results) if not one.missing]
+    found = list(outcomes(asked, [sys.executable, str(script), str(library), "60"]))
+    assert [(one.name, one.word) for _, one in found] == [
+        ("Own.Decay", PASSED),
+        ("Own.Gone", NOT_RUN),
+        ("Own.Partly", NOT_RUN),
+    ]
+    assert found[2][1].detail == "Missing"
+    assert {version for version, _ in found} == {"0.1"}
+
+
+def test_a_sample_is_spread_over_the_names_of_a_package(tmp_path):
+    for k in range(8):
+        folder = tmp_path / "Modelica" / "Blocks" / "Examples" / f"E{k}"
+        folder.mkdir(parents=True)
+        (folder / f"E{k}.csv").touch()
+    found = [Reference(tmp_path, f"Modelica.Blocks.Examples.E{k}") for k in range(8)]
+    assert [one.name[-1] for one in sample(found)] == ["0", "2", "4", "6"]

@@ -16,8 +16,8 @@ def ran(tmp_path):
 
 
 PULSES = """model M
-  Boolean b, c(start=false);
-  Integer n(start=0), m(start=0);
+  Boolean b, c(start=false), d = sample(0, 0.3);
+  Integer n(start=0), m(start=0), k(start=0);
   discrete Real last(start=-1, fixed=true);
 equation
   b = sample(0.25, 0.5);
@@ -25,6 +25,9 @@ equation
   when b then
     n = pre(n) + 1;
     last = time;
+  end when;
+  when d then
+    k = pre(k) + 1;
   end when;
   when {c, initial()} then
     m = pre(m) + 1;
@@ -35,7 +38,34 @@ end M;
 
 def test_a_boolean_that_is_a_sample_is_true_at_its_instants_only(ran):
     found = ran(PULSES)
-    assert [found.final(name) for name in ("n", "m", "last", "b")] == [4, 5, 1.75, 0]
+    assert [found.final(name) for name in ("n", "m", "k", "last", "b", "d")] == [4, 5, 7, 1.75, 0, 0]
+
+
+LATCHES = """model M
+  Boolean u = time > 0.5 and time < 1;
+  Integer n(start=1, fixed=true), m, k(start=1, fixed=true);
+algorithm
+  n := if u then 7 else pre(n);
+  m := 2 * n;
+algorithm
+  if u then
+    k := 5;
+  elseif time >= 1.5 then
+    k := pre(n);
+  else
+    k := pre(k);
+  end if;
+end M;
+"""
+
+
+def test_an_algorithm_outside_of_when_keeps_values_before(ran):
+    found = ran(LATCHES)
+    assert [[float(found.at(t, n)) for t in (0.4, 0.7, 1.2, 1.9)] for n in "nmk"] == [
+        [1, 7, 7, 7],
+        [2, 14, 14, 14],
+        [1, 5, 5, 7],
+    ]
 
 
 CHOICES = """function first "index of the first true one, 0 without any, and the one behind it that is true"

@@ -37,7 +37,8 @@ class Polynomials:
     def at(self, x: ca.SX) -> tuple[list[ca.SX], ca.SX]:
         """The functions of a scalar expression, and 1 beyond the ends, else 0."""
         onwards = not self.smooth and bool(np.any(self.slopes))  # straight lines go on as they are
-        below, above = x < self.low, x > self.high
+        # the last point belongs to a line that goes on, as every edge to the piece behind it
+        below, above = x < self.low, x >= self.high if np.any(self.slopes) else x > self.high
         within = x if onwards else ca.if_else(below, self.low, ca.if_else(above, self.high, x))
         sides = [ca.SX(1), *(within >= edge for edge in self.edges.tolist())]
         inside = [before - after for before, after in pairwise(sides)]

@@ -21,7 +21,7 @@ from gantrytau.language.declarations import (
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import is_call
 from gantrytau.modelica.elaboration.kinds import check_type
-from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.modifiers import Modifier, annotated
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.overdetermined.records import is_overdetermined, is_propagated, propagated_quantity
@@ -55,7 +55,8 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     if one.is_parameter:
         for key in ("start", "fixed", "free"):
             words.pop(key, None)
-        fold = _flag(one, "Evaluate")
+        said_fold = annotated(one.element.declaration.annotation, "Evaluate")
+        fold = said_fold is not None and said_fold.value == tree.BooleanLiteral(0, True)
         body[name] = made = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
         made.final = one.full.final
         made.free = is_free(one)
@@ -92,14 +93,6 @@ def _is_differentiated(one: ClassMember) -> bool:
     return any(x.parts[0][0] == one.name for call in calls for x in references(call.arguments))
 
 
-def _flag(one: ClassMember, name: str) -> bool:
-    """Whether an annotation of a component says true."""
-    for said in one.element.declaration.annotation or ():
-        if isinstance(said, tree.Argument) and said.name == name and said.modification is not None:
-            return isinstance(value := said.modification.value, tree.BooleanLiteral) and value.value
-    return False
-
-
 def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[str, Any]:
     """The attributes of a quantity that a modification in a class sets, by the names of the language."""
     found: dict[str, Any] = {}
@@ -126,14 +119,14 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name in ("fixed", "free"):
-            value = structure.folded(attribute.seen_from(structure))
-            each = set(np.ravel(value))
-            if len(each) > 1:
-                words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
+            value = np.array(structure.folded(attribute.seen_from(structure)), dtype=bool)
+            alike = value.all() or not value.any()
+            if not alike and (one.is_parameter or name == "free"):
+                words = f"found '{name}' of some elements of '{one.name}', expected all or none; declare two arrays"
                 attribute.scope.refuse(attribute.at, words)
             # of Booleans and Integers it says pre(b) = start, not b = start (chapter 8.6)
             if one.is_parameter or one.kind == "Real" or name == "free":
-                found[name] = bool(each.pop())
+                found[name] = bool(value.any()) if alike else value
         elif name == "stateSelect":
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:
@@ -198,7 +191,13 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
 def is_free(one: ClassMember) -> bool:
     """Whether a text leaves a quantity to the optimiser."""
     said = one.full.inner.get("free")
-    return said is not None and said.value is not None and _said(one, said)
+    if said is None or said.value is None:
+        return False
+    found = {bool(value) for value in np.ravel(one.owner.folded(said))}
+    if len(found) > 1:
+        words = f"found some elements of '{one.name}' free, expected all or none; declare two arrays"
+        said.scope.refuse(said.at, words)
+    return found.pop()
 
 
 def refuse_free(one: ClassMember) -> None:
@@ -213,18 +212,8 @@ def refuse_free(one: ClassMember) -> None:
 
 def inside_optimization(structure: Structure) -> bool:
     """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
-    root = structure
-    while root.around is not None:
-        root = root.around
+    *_, root = structure.outward()
     return root is not structure and root.scope.definition.kind == "optimization"
-
-
-def _said(one: ClassMember, said: Modifier) -> bool:
-    found = {bool(value) for value in np.ravel(one.owner.folded(said))}
-    if len(found) > 1:
-        words = f"found some elements of '{one.name}' set, expected all or none; declare two arrays"
-        said.scope.refuse(said.at, words)
-    return found.pop()
 
 
 def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifier:
@@ -251,9 +240,9 @@ def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifi
 
 
 def is_fixed(one: ClassMember) -> bool:
-    """Whether the start value of a variable holds."""
+    """Whether the start value of a variable holds, of an array that of some elements at least."""
     said = one.full.inner.get("fixed")
-    return said is not None and said.value is not None and _said(one, said)
+    return said is not None and said.value is not None and bool(np.any(one.owner.folded(said)))
 
 
 def _as_value(one: ClassMember, guess: Modifier) -> Modifier:

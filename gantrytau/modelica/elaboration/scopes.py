@@ -7,20 +7,19 @@ from typing import NoReturn, cast
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import with_pulses
-from gantrytau.modelica.elaboration import modifiers
+from gantrytau.modelica.conditions import bound_pulses, is_call, read_section
 from gantrytau.modelica.elaboration.modifiers import (
     Element,
     Modifier,
     StatementSection,
     merged,
     read_arguments,
+    read_constraint,
     read_modification,
 )
 from gantrytau.modelica.optimizations import HORIZON
+from gantrytau.modelica.parser import ELEMENT_SECTIONS
 from gantrytau.modelica.source import SourceText
-
-ELEMENT_SECTIONS = ("", "public", "protected")
 
 
 class TextError(ModelError):
@@ -86,11 +85,8 @@ class ClassScope:
     @cached_property
     def classes(self) -> dict[str, "ClassScope"]:
         """The classes that stand in it."""
-        found = {
-            i.name: ClassScope(i, self.source, self)
-            for i in self.items
-            if isinstance(i, tree.ClassDefinition)
-        }
+        own = (i for i in self.items if isinstance(i, tree.ClassDefinition))
+        found = {i.name: ClassScope(i, self.source, self) for i in own}
         new = self.replaced
         return found | {name: replace(new[name], limit=old) for name, old in found.items() if name in new}
 
@@ -104,6 +100,9 @@ class ClassScope:
                 if one.name in found:
                     self.refuse(one.at, f"found a second component '{one.name}' of {self.name}, expected one")
                 said = read_modification(one.modification, self, final="final" in clause.prefixes)
+                said = (
+                    replace(said, value=None) if is_call(said.value, "sample") else said
+                )  # a section has it
                 found[one.name] = Element(clause, one, self, said, protected)
         return found
 
@@ -154,13 +153,10 @@ class ClassScope:
         start = self.around if isinstance(self.definition.body, tree.ShortClass) and self.around else self
         base = start.find_class(name, at, inherited=False)
         limits = (self, self.limit) if isinstance(self.definition.body, tree.ShortClass) else ()
-        modifier = merged(read_arguments(arguments, start), modifiers.read_constraint(*limits))
-        anew = (
-            x
-            for x in self.classes.items()
-            if "redeclare" in x[1].definition.prefixes or x[1].extends_its_name
-        )
-        found = base.redeclared(modifier).with_replaced({**dict(anew), **self.replaced})
+        modifier = merged(read_arguments(arguments, start), read_constraint(*limits))
+        own = self.classes.items()
+        anew = {n: x for n, x in own if "redeclare" in x.definition.prefixes or x.extends_its_name}
+        found = base.redeclared(modifier).with_replaced({**anew, **self.replaced})
         if base.definition.kind == "package" and (modifier.inner or self.declared or self.heir):
             found = replace(found, heir=self.heir or self)
         return found, modifier
@@ -191,14 +187,10 @@ class ClassScope:
 
     def refuse_beyond(self, limit: "ClassScope", place: "ClassScope", at: int) -> None:
         """TextError where this class lacks a public component of the class that constrains what may replace it."""
-        public = (name for name, one in limit.elements.items() if not one.protected)
-        missing = next((name for name in public if name not in self.elements), None)
-        if missing is not None:
-            place.refuse(
-                at,
-                f"found {self.name} for what {limit.name} constrains, but it has no '{missing}', expected a class with all "
-                f"components of {limit.name}",
-            )
+        for name, one in limit.elements.items():
+            if not one.protected and name not in self.elements:
+                words = f"found {self.name} for what {limit.name} constrains, but it has no '{name}'"
+                place.refuse(at, f"{words}, expected a class with all components of {limit.name}")
 
     def check_replaced(self) -> None:
         """TextError for a redeclared class, here or in what it extends, that its constraint does not allow."""
@@ -226,7 +218,7 @@ class ClassScope:
                 if name in found and found[name].scope.definition.name != HORIZON:
                     self._check_same(found[name], element)
                 found[name] = replace(element, protected=True) if any(hidden[k : k + 1]) else element
-            self._check_names(base, modifier)
+            base.check_modified(modifier)
         for name, element in self.declared.items():
             old = found.get(name)
             if old is not None and "redeclare" in element.clause.prefixes:
@@ -238,21 +230,23 @@ class ClassScope:
 
     def _check_same(self, one: Element, other: Element) -> None:
         """TextError for two declarations of one name that say different things."""
-        if one.stated != other.stated or not one.modifier.says_the_same(other.modifier):
-            places = " and in ".join(x.scope.name for x in (one, other))
-            self.refuse(
-                other.declaration.at if other.scope is self else self.definition.at,
-                f"found '{one.declaration.name}' declared differently in {places}, expected one declaration; rename one, or "
-                "modify it where it is inherited",
-            )
+        said = one.stated == other.stated and one.modifier.says_the_same(other.modifier)
+        kinds = [x.scope.find_class(x.clause.type, x.clause.at) for x in (one, other)] if said else []
+        if not said or kinds[0].definition != kinds[1].definition:
+            at = other.declaration.at if other.scope is self else self.definition.at
+            self._refuse_different(one.declaration.name, one.scope, other.scope, at)
 
-    def _check_names(self, base: "ClassScope", modifier: Modifier) -> None:
+    def _refuse_different(self, name: str, one: "ClassScope", other: "ClassScope", at: int) -> NoReturn:
+        words = f"found '{name}' declared differently in {one.name} and in {other.name}"
+        self.refuse(at, f"{words}, expected one declaration; rename one, or modify it where it is inherited")
+
+    def check_modified(self, modifier: Modifier) -> None:
+        """TextError for a modification of what the class does not have."""
         for name, one in modifier.inner.items():
-            if name not in base.elements and one.redeclared is None and not base.is_primitive:
-                self.refuse(
-                    one.at,
-                    f"found '{name}' modified, which {base.name} does not have{did_you_mean(name, base.elements)}",
-                )
+            a_class = one.redeclared is not None and one.member_clause is None
+            if not (name in self.elements or a_class or one.scope is None or self.is_primitive):
+                hint = did_you_mean(name, self.elements)
+                one.scope.refuse(one.at, f"found '{name}' modified, which {self.name} lacks{hint}")
 
     @cached_property
     def is_primitive(self) -> bool:
@@ -272,8 +266,9 @@ class ClassScope:
         body = self.definition.body
         for one in body.sections if isinstance(body, tree.Composition) else ():
             if one.kind not in ELEMENT_SECTIONS:
-                items = tuple(with_pulses(i for i in one.items if not isinstance(i, tree.Element)))
-                found.append(StatementSection(one.kind, items, self))
+                found.append(StatementSection(*read_section(one), self))
+        if pulses := tuple(bound_pulses(self.declared)):
+            found.append(StatementSection("equation", pulses, self))
         return tuple(found)
 
     def names(self) -> list[str]:
@@ -293,8 +288,13 @@ class ClassScope:
 
     def inherited_class(self, name: str) -> "ClassScope | None":
         """The class of that name in it or in what it extends."""
-        found = self.own_class(name)
-        return found or next((x for base, _ in self.bases if (x := base.inherited_class(name))), None)
+        if (found := self.own_class(name)) is not None:
+            return found
+        inherited = [x for base, _ in self.bases if (x := base.inherited_class(name)) is not None]
+        other = next((x for x in inherited if x.definition != inherited[0].definition), None)
+        if other is not None and inherited[0].around and other.around:
+            self._refuse_different(name, inherited[0].around, other.around, self.definition.at)
+        return next(iter(inherited), None)
 
     @cached_property
     def _imports(self) -> list[tree.Import]:
@@ -324,8 +324,9 @@ class ClassScope:
 
     def imported_literal(self, name: str) -> "tuple[ClassScope, str] | None":
         """The enumeration and the name of its value that an import, here or further out, means by a name."""
-        found = ((one, inner) for one, inner, _ in self.imports(name) if inner in (one.literals or ()))
-        return next(found, None) or (self.around.imported_literal(name) if self.around else None)
+        return next(
+            ((one, inner) for one, inner in self._places(name) if inner in (one.literals or ())), None
+        )
 
     def _check_imports(self, name: str) -> None:
         """TextError where two imports of one kind, of single names or of all names, make different things of a name."""
@@ -359,15 +360,17 @@ class ClassScope:
 
     def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
         """The component that a simple name means in a class around this one, and that class."""
+        known = ((one.heir or one, inner) for one, inner in self._places(name) if inner in one.elements)
+        return next(((one, one.elements[inner]) for one, inner in known), None)
+
+    def _places(self, name: str) -> Iterator[tuple["ClassScope", str]]:
+        """The classes in which a simple name may mean a constant, with its name there: here, by imports, further out."""
         here: ClassScope | None = self
         while here is not None:
             here._check_imports(name)
-            for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
-                if inner in owner.elements:
-                    owner = owner.heir or owner
-                    return owner, owner.elements[inner]
+            yield here, name
+            yield from ((owner, inner) for owner, inner, _ in here.imports(name))
             here = here.around
-        return None
 
     def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""
@@ -391,9 +394,4 @@ class ClassScope:
 
     def known_names(self) -> list[str]:
         """Names of classes that can be said here, for messages."""
-        here: ClassScope | None = self
-        found: list[str] = []
-        while here is not None:
-            found += [*here.classes]
-            here = here.around
-        return [*dict.fromkeys(found)]
+        return [*dict.fromkeys((*self.classes, *(self.around.known_names() if self.around else ())))]

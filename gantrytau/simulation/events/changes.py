@@ -116,6 +116,8 @@ class Changes:
         if self._holding.size:
             self._unsampled = k, trail.held[k].copy(), trail.z[k].copy()
         new = np.array(self.coordinates.renewed(trail.x[k], trail.z[k], t, t, trail.inputs(k))).ravel()
+        for law in self.coordinates.dae.flat.laws:
+            law.obeyed(t, self.coordinates.held, due, new)
         for name, value, now in zip(self.coordinates.held, new, due, strict=True):
             if now and not np.isfinite(value):
                 raise run_ends.sampled_badly(self.coordinates.dae, t, name)

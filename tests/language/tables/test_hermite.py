@@ -60,3 +60,12 @@ def test_a_surface_with_one_profile_is_its_curve():
     inside = (at >= 1.5) & (at <= 4.0)
     wanted = values(curve(x, u, z, "akima", "hold"), at)
     np.testing.assert_allclose(found[inside], wanted[inside], rtol=0, atol=ROUNDING * 100)
+
+
+@pytest.mark.parametrize(("outside", "slope", "curvature"), [("linear", 2.0, 0.0), ("hold", 2.0, 2.0)])
+def test_the_last_point_of_a_curve_that_goes_on_belongs_to_its_line(outside, slope, curvature):
+    """Of the parabola x^2 from 0 to 1, which rises at 1 by 2."""
+    parabola = curve(x, np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.25, 1.0]), "akima", outside)
+    at, once = np.array([1.0]), ca.jacobian(parabola, x)
+    np.testing.assert_allclose(values(once, at), slope, atol=ROUNDING)
+    np.testing.assert_allclose(values(ca.jacobian(once, x), at), curvature, atol=ROUNDING)

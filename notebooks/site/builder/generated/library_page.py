@@ -31,13 +31,22 @@ Times below are processor time: from text to the integration, and the integratio
 Of libraries of others, without reference results, the examples are run and no more: those that came to the end of their
 annotation `experiment` "ran". `MODELICAPATH=folder:folder_of_Modelica make library-results ONLY=PlanarMechanics`.
 """
+PEER = """A sample, evenly spread over the names of each package, simulated by {name} on the same machine ({date}): the same
+start, stop, tolerance and output times, compared in the same tubes. Times are processor time of all threads. {name} runs all
+examples in one session, which keeps what it has read; here each has a process of its own, which reads what it needs.
+
+```text
+RUMOCA=python_that_imports_rumoca MODELICAPATH=... REFERENCE_RESULTS=... python -m tests.library_results.peer
+```
+"""
 WORDS = ("passed", "left", "refused", "not run", "no reference", "ran")
 HEAD = ("package", "examples", *WORDS, "translate, s", "simulate, s", "library", "date")
 
 
 def library_page() -> str:
     """The page in Markdown."""
-    packages = tomllib.loads((SOURCES / "library_results.toml").read_text(encoding="utf-8"))["package"]
+    read = tomllib.loads((SOURCES / "library_results.toml").read_text(encoding="utf-8"))
+    packages = read["package"]
     text = f"{OPENING}\n## By package\n\n{table('', HEAD, list(map(_row, packages)))}\n\n## What did not pass\n\n"
     wrong = [
         (f"`{one['name']}`", one["word"], escaped(one["detail"]))
@@ -45,7 +54,37 @@ def library_page() -> str:
         for one in package["example"]
         if one["word"] not in ("passed", "ran")
     ]
-    return f"{text}{table('', ('example', '', 'first signal that leaves, or message'), wrong)}\n"
+    text += f"{table('', ('example', '', 'first signal that leaves, or message'), wrong)}\n"
+    ours = {one["name"]: one for package in packages for one in package["example"]}
+    return text + "".join(_beside(peer, ours) for peer in read.get("peer", []))
+
+
+def _beside(peer: Mapping[str, Any], ours: Mapping[str, Mapping[str, Any]]) -> str:
+    """The sample that another program simulated beside the same examples here."""
+    pairs = [(ours[one["name"]], one) for one in peer["example"] if one["name"] in ours]
+    both = [pair for pair in pairs if all(one["word"] == "passed" for one in pair)]
+    words = [sum(pair[side]["word"] == "passed" for pair in pairs) for side in (0, 1)]
+    medians = {
+        stage: [_median(pair[side][stage] for pair in both) for side in (0, 1)]
+        for stage in ("translate", "simulate")
+    }
+    told = [f"median s to {stage} {here} and {there}" for stage, (here, there) in medians.items()]
+    rows = [
+        (f"`{a['name']}`", a["word"], *_times(a), b["word"], *_times(b), escaped(b["detail"]))
+        for a, b in pairs
+    ]
+    head = ("example", "here", "translate, s", "simulate, s", peer["name"], "translate, s", "simulate, s", "")
+    return (
+        f"\n## Beside {peer['name']} {peer['version']}\n\n{PEER.format(name=peer['name'], date=peer['date'])}\n"
+        f"Passed: {words[0]} of {len(pairs)} here, {words[1]} by {peer['name']}. "
+        f"Of the {len(both)} that both pass: {', '.join(told)}.\n\n{table('', head, rows)}\n"
+    )
+
+
+def _times(one: Mapping[str, Any]) -> tuple[str, str]:
+    if one["word"] not in ("passed", "left"):
+        return "", ""
+    return f"{one['translate']:.2g}", f"{one['simulate']:.2g}"
 
 
 def _row(package: Mapping[str, Any]) -> Sequence[str]:
