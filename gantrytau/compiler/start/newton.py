@@ -13,7 +13,8 @@ LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle
 NOTHING = 1e-11  # of the largest singular value, below which one counts as zero
 SQUARE = 1e8  # condition below which a square system has one solution, whatever the weights
 LARGE = 20  # equations from which on elimination is quicker than singular values
-BALANCE = 1e-3  # between residuals and unknowns that are solved together: singular values as small keep their digits
+BALANCE = 1e-5  # between residuals and unknowns that are solved together: singular values as small keep their digits
+TOGETHER = 1e10  # condition up to which these are: six digits of a step are left
 DENSE = 50_000  # elements of a matrix from which on it is sparse
 
 Matrix = Any  # np.ndarray or scipy.sparse.csr_array, (m, n)
@@ -148,7 +149,7 @@ class _Steps:
         first, second, matrix = (n, m, self._matrix.T) if wide else (m, n, self._matrix)
         lower = None if not damping else -damping / BALANCE * eye_array(second)
         whole = csc_array(block_array([[BALANCE * eye_array(first), matrix], [matrix.T, lower]]))
-        solve = _well_conditioned(whole)
+        solve = _eliminated(whole, TOGETHER)
         if solve is None:
             return None
         if wide:
@@ -170,12 +171,12 @@ class _Steps:
             if singular or not condition(factors, largest)[0] * SQUARE > 1:
                 return None
             return solve(factors, pivots, self.target)[0]
-        solve = _well_conditioned(self._matrix.tocsc())
+        solve = _eliminated(self._matrix.tocsc(), SQUARE)
         return None if solve is None else solve(self.target)
 
 
-def _well_conditioned(matrix: Any) -> Callable[[np.ndarray], np.ndarray] | None:
-    """The solution of a square sparse system by elimination, where its condition leaves digits."""
+def _eliminated(matrix: Any, condition: float) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The solution of a square sparse system by elimination, where its condition is below this."""
     from scipy.sparse import linalg
 
     sparse: Any = linalg
@@ -187,7 +188,7 @@ def _well_conditioned(matrix: Any) -> Callable[[np.ndarray], np.ndarray] | None:
         matrix.shape, matvec=factors.solve, rmatvec=lambda v: factors.solve(v, "T"), dtype=float
     )
     largest = float(abs(matrix).sum(axis=0).max())
-    return factors.solve if largest * sparse.onenormest(inverse) < SQUARE else None
+    return factors.solve if largest * sparse.onenormest(inverse) < condition else None
 
 
 def _sound(f: np.ndarray, jacobian: Matrix) -> bool:

@@ -36,7 +36,7 @@ class Changes:
         self.coordinates, self.trail, self.sizes, self.span = coordinates, trail, sizes, span
         begin = float(trail.t[0])
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
-        self._chatter = Chatter()
+        self._chatter, self._hops = Chatter(), Hops()
         self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
         self._cancels = False  # whether a margin is zero by an identity: its slopes do not tell its rounding
         self.ended = ""  # what a when said that ended the run
@@ -53,7 +53,6 @@ class Changes:
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
         self.acts = np.zeros(self._holding.size, dtype=int)  # of each when, counted
-        self._hops = Hops()
         self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
 
     def modes(self, k: int) -> np.ndarray:
