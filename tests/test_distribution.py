@@ -47,10 +47,7 @@ def test_the_page_has_no_links_into_the_repository(built):
     links = re.findall(r"\]\(([^)]+)\)", page)
     assert len(links) > 10
     assert [link for link in links if not link.startswith("https://")] == []
-    assert {line.partition(",")[0] for line in metadata.get_all("Project-URL", [])} >= {
-        "Homepage",
-        "Issues",
-    }
+    assert {line.partition(",")[0] for line in metadata.get_all("Project-URL", [])} >= {"Homepage", "Issues"}
 
 
 def test_the_sources_bring_what_explains_them(built):

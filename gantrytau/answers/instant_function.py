@@ -14,6 +14,7 @@ from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.request import names
 from gantrytau.compiler.translated import Translated
 from gantrytau.compiler.translation import retranslate
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable
 from gantrytau.flattening.whens import one_round
 from gantrytau.language.statements import Equation
@@ -56,7 +57,7 @@ def sample_function(dae: Translated, given: Sequence[str], find: Sequence[str]) 
     """One step of a sampled controller: (given, held before) -> (find, held behind), vectors of scalars.
 
     held: the sampled variables in the order of `dae.flat.sampled`; `find` is evaluated behind the instant. Raises
-    ModelError for a model with states, whens, delays or friction, or without sampled variables.
+    ModelError for a model with states, whens, delays, friction or laws, or without sampled variables.
     """
     flat = dae.flat
     if not flat.sampled:
@@ -68,6 +69,7 @@ def sample_function(dae: Translated, given: Sequence[str], find: Sequence[str]) 
         raise ModelError(
             f"{dae.name}: found {what}, expected a model of sampled variables alone; leave the plant out"
         )
+    refuse_events(flat, "laws")
     held = [s.name for s in flat.sampled]
     renewed = retranslate(dae, _with_unknowns(flat, {s.name: s.expression for s in flat.sampled}))
     before = function(renewed, [*given, *held], [f"after({n})" for n in held])

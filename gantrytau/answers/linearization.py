@@ -109,12 +109,12 @@ def linearize(
     of what moves and of what is held, its outputs those just after it.
     States that cannot be states at the point are replaced by others. Raises InitializationError if there is
     no such point, StructureError if the equations are singular there, ModelError for unknown names, a period that
-    does not fit, and a model with whens.
+    does not fit, and a model with whens or laws.
     """
     if period is not None:
         period = number("linearize", "period", period, unit="s", above=0)
     dae = model if isinstance(model, Translated) else translate_model(model)
-    refuse_events(dae.flat, "frictions", "delays", "whens")
+    refuse_events(dae.flat, "frictions", "delays", "whens", "laws")
     if parameters:
         dae = _with_parameters(dae, parameters)
     columns = dae.inputs if inputs is None else _expanded(dae, "inputs", names(inputs))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError, in_words
 from gantrytau.border.units import given, known_scale
@@ -91,7 +92,7 @@ def _common(placed: Placed) -> dict[str, Any]:
         display=display,
         description=attributes["description"].value if "description" in attributes else "",
         start=expression(placed, "start") if "start" in attributes else None,
-        fixed=bool(attributes["fixed"].value) if "fixed" in attributes else False,
+        fixed=all(fixed_elements(placed)),
         chosen=placed.chosen,
         owner=placed.path,
         free=bool(attributes["free"].value)
@@ -100,6 +101,16 @@ def _common(placed: Placed) -> dict[str, Any]:
         undetermined=attributes["undetermined"].value,
         **limits,
     )
+
+
+def fixed_elements(placed: Placed) -> list[bool]:
+    """Whether the start of each scalar is an initial condition, column after column."""
+    found = np.asarray(placed.attributes["fixed"].value if "fixed" in placed.attributes else False)
+    if found.shape not in ((), placed.shape):
+        raise ModelError(
+            f"{placed.name}: fixed has shape {found.shape}, expected {placed.shape}, or one True or False for all"
+        )
+    return [bool(one) for one in np.broadcast_to(found, placed.shape).ravel(order="F")]
 
 
 def _unit(placed: Placed) -> str | None:

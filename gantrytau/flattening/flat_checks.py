@@ -97,6 +97,8 @@ REFUSED = {  # statements on instants -> why they cannot be
     "delays": "found a value of the past, expected equations of one time. simulate and FMUs remember it; functions, linear "
     "systems and optimisation cannot: leave it out there, or write a chain of first-order lags, T / n * der(y) == x - y, "
     "n times; translate(..., events=True) takes it as known",
+    "laws": "found a function of Python that is called at instants, expected formulas. simulate calls it; optimisation, "
+    "linearisation, extraction, C code, FMUs and Modelica cannot: leave it out there",
     "sampled": "found a value that jumps at instants, expected continuous equations. simulate, linearize and FMUs sample "
     "it; optimisation and extraction cannot: leave it out there, or write it as a continuous equation. "
     "translate(..., events=True) takes it as known",

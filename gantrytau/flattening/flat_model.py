@@ -1,10 +1,11 @@
 """The record of a flattened model: what crosses from the language to the compiler."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.dimensions import per_second
 from gantrytau.border.refusal import ModelError, did_you_mean
@@ -96,6 +97,31 @@ class Sampled:
     def sides(self) -> tuple[tuple[str, ca.SX], ...]:
         """Its expressions, each with the name of what it is a value of."""
         return (self.name, self.expression), ("time", self.period)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledLaw:
+    """Sampled scalars `found` that take what `law(t, values of given)` returns at their instants, in the place of formulas.
+
+    given: sampled scalars, at the same instants; path, model: where it is stated.
+    """
+
+    found: tuple[str, ...]
+    given: tuple[str, ...]
+    law: Callable[[float, np.ndarray], Sequence[float]]
+    path: str
+    model: str
+
+    @property
+    def label(self) -> str:
+        """Where it is stated, and of what."""
+        return f"{place_of(self.path, self.model)}, by_law({', '.join(self.found)})"
+
+    def obeyed(self, t: float, held: Sequence[str], due: np.ndarray, new: np.ndarray) -> None:
+        """Put its values among the new ones (n,) of `held`, if they are due at time t."""
+        found, given = ([held.index(name) for name in names] for names in (self.found, self.given))
+        if due[found].all():
+            new[found] = self.law(t, new[given])
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +227,7 @@ class FlatModel(Record):
     either, discretes by `whens`; slips: frictions whose forces are unknowns and whose modes are the last of the discretes,
     as simulations have them; before: symbols of the values of discretes just before an instant, by their names;
     modes: names of the values 0, 1, ... of a discrete, by its name; delays: scalars that are known from the past;
-    ranges: where tables end that are not defined beyond;
+    ranges: where tables end that are not defined beyond; laws: functions of Python that set sampled scalars;
     rods: what a robot says of its links, by name; shapes: what its components look like, by names; unchecked: paths of
     components whose units are words only; experiment: what the model says of its simulation, `StopTime`.
     """
@@ -221,6 +247,7 @@ class FlatModel(Record):
     absent: Mapping[str, str]
     requirements: tuple[Requirement, ...]
     sampled: tuple[Sampled, ...] = ()
+    laws: tuple[SampledLaw, ...] = ()
     frictions: tuple[StickSlip, ...] = ()
     slips: tuple[StickSlip, ...] = ()
     whens: tuple[When, ...] = ()

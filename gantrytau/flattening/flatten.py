@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from gantrytau.border.refusal import told
-from gantrytau.flattening.attributes import expression, flat_parameter, flat_variable
+from gantrytau.flattening.attributes import expression, fixed_elements, flat_parameter, flat_variable
 from gantrytau.flattening.connections import connection_equations
 from gantrytau.flattening.flat_checks import (
     refuse_absent,
@@ -20,13 +20,21 @@ from gantrytau.flattening.flat_checks import (
 )
 from gantrytau.flattening.flat_model import FlatModel, FlatVariable, Sampled, StickSlip, When
 from gantrytau.flattening.instantiation import Instance, Placed, instantiate
-from gantrytau.flattening.instants import Events, read_delays, read_events, sides, with_sides, with_starts
+from gantrytau.flattening.instants import (
+    Events,
+    read_delays,
+    read_events,
+    read_laws,
+    sides,
+    with_sides,
+    with_starts,
+)
 from gantrytau.flattening.loop_closures import Closure
 from gantrytau.flattening.propagation import Spread, Tree, defining, inlined, spanning_tree
 from gantrytau.flattening.transitions import read_transitions
 from gantrytau.flattening.whens import read_whens, refuse_unassigned
 from gantrytau.language.declarations import Parameter
-from gantrytau.language.events import Sampling, Sticking, Transition, WhenChain
+from gantrytau.language.events import Lawful, Sampling, Sticking, Transition, WhenChain
 from gantrytau.language.model import Model
 from gantrytau.language.scalar_arithmetic import leaf_names
 from gantrytau.language.self_description.appearance import Shape, shapes_of
@@ -63,6 +71,7 @@ class _Stated:
     ways: list[tuple[str, str, int, Branch | Root]] = field(default_factory=list)
     requirements: list[Requirement] = field(default_factory=list)
     events: list[tuple[str, str, int, Sampling | Sticking]] = field(default_factory=list)
+    laws: list[tuple[str, str, int, Lawful]] = field(default_factory=list)
     whens: list[tuple[str, str, int, WhenChain]] = field(default_factory=list)
     transitions: list[tuple[str, str, int, Transition]] = field(default_factory=list)
     modes: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -80,6 +89,8 @@ class _Stated:
             self.requirements.append(replace(statement, path=path, model=name))
         elif isinstance(statement, (Sampling, Sticking)):
             self.events.append((path, name, number, statement))
+        elif isinstance(statement, Lawful):
+            self.laws.append((path, name, number, statement))
         elif isinstance(statement, WhenChain):
             self.whens.append((path, name, number, statement))
         elif isinstance(statement, Transition):
@@ -107,6 +118,7 @@ def _stated(instance: Instance) -> _Stated:
         for number, statement in _statements(component.initial_equations, path, name):
             found.take(path, name, number, statement, initial=True)
         instance.symbols.ranges[:] = ranges  # what is asked at the start alone is not watched
+    found.initial += _fixed_starts(instance)
     samplings, chains, found.modes = read_transitions(found.transitions, instance)
     found.events += samplings
     found.whens += chains
@@ -178,8 +190,7 @@ def write_out(instance: Instance) -> FlatModel:
         before={n: s.sx for n in discretes if (s := instance.symbols.by_name.get(f"pre({n})"))},
         delays=delays,
         ranges=_ranges(instance.symbols, spread),
-        modes=stated.modes,
-        **_said(instance),
+        **_said(instance, stated, sampled),
         shapes=_shapes(instance, absent),
     )
 
@@ -192,11 +203,16 @@ def _shapes(instance: Instance, absent: Mapping[str, str]) -> tuple[Shape, ...]:
     return tuple(shape for shape in found if not gone & set(shape.names))
 
 
-def _said(instance: Instance) -> dict[str, Any]:
+def _said(instance: Instance, stated: _Stated, sampled: Sequence[Sampled]) -> dict[str, Any]:
     """What the components say of themselves beside their equations."""
+    laws = read_laws(stated.laws, instance.symbols, sampled)
     unchecked = frozenset(path for path, one in instance.components if not one.checks_units)
     return dict(
-        rods=rods_of(instance.root), unchecked=unchecked, experiment=instance.root.annotated_experiment
+        rods=rods_of(instance.root),
+        unchecked=unchecked,
+        experiment=instance.root.annotated_experiment,
+        laws=laws,
+        modes=stated.modes,
     )
 
 
@@ -291,6 +307,17 @@ def _bindings(instance: Instance) -> list[Equation]:
                     Equation(left, right, placed.name, "binding", 1, row if len(value) > 1 else None)
                 )
     return found
+
+
+def _fixed_starts(instance: Instance) -> Iterator[Equation]:
+    """Initial equations of the arrays of which some elements alone have fixed starts."""
+    for placed in instance.quantities:
+        fixed = [] if _is_parameter(placed) else fixed_elements(placed)
+        if any(fixed) and not all(fixed):
+            starts = expression(placed, "start") if "start" in placed.attributes else [ca.SX(0)] * len(fixed)
+            for row, (left, right) in enumerate(zip(scalars(placed.symbol), starts, strict=True)):
+                if fixed[row]:
+                    yield Equation(left, right, placed.name, "fixed start", 1, row)
 
 
 def _free_inputs(instance: Instance, equations: Iterable[Equation]) -> tuple[str, ...]:

@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 import casadi as ca
 
 from gantrytau.border.refusal import ModelError
-from gantrytau.flattening.flat_model import Delay, FlatVariable, OnInstants, Sampled, StickSlip
+from gantrytau.flattening.flat_model import Delay, FlatVariable, OnInstants, Sampled, SampledLaw, StickSlip
 from gantrytau.flattening.propagation import Spread
 from gantrytau.flattening.shapes import joined
-from gantrytau.language.events import Sampling, Sticking
+from gantrytau.language.events import Lawful, Sampling, Sticking
 from gantrytau.language.statements import Equation, Requirement, place_of
 from gantrytau.language.symbols import Symbol, Symbols, scalars
 
@@ -58,6 +58,23 @@ def _read_sampling(events: Events, statement: Sampling, symbols: Symbols, where:
     for name, expression in zip(names, expressions, strict=True):
         _take(events, name, place)
         events.sampled.append(Sampled(name, expression, period, path, model))
+
+
+def read_laws(
+    stated: Sequence[tuple[str, str, int, Lawful]], symbols: Symbols, sampled: Sequence[Sampled]
+) -> tuple[SampledLaw, ...]:
+    """The laws of statements (path, class, number, statement); ModelError for what is not sampled."""
+    found, known = [], {one.name for one in sampled}
+    for path, model, number, one in stated:
+        place = place_of(path, model, number)
+        sets, reads = (
+            tuple(s.name for x in side for s in declared(x, symbols, place, "by_law", ("real", "output")))
+            for side in (one.found, one.given)
+        )
+        if odd := [name for name in (*sets, *reads) if name not in known]:
+            raise ModelError(f"{place}: found {odd[0]} in by_law, expected sampled scalars; sample it")
+        found.append(SampledLaw(sets, reads, one.law, path, model))
+    return tuple(found)
 
 
 def _read_sticking(events: Events, statement: Sticking, symbols: Symbols, where: tuple[str, str, str]):

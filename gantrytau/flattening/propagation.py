@@ -11,6 +11,7 @@ from functools import reduce
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from gantrytau.border.refusal import ModelError, StructureError
 from gantrytau.flattening.flat_checks import first_with
@@ -185,7 +186,7 @@ def inlined(quantities: Iterable[Placed]) -> Iterator[Placed]:
         fixed = one.attributes.get("fixed")
         if (
             getattr(one.declaration, "inlined", False)
-            and not (fixed and fixed.value)
+            and not (fixed and np.any(fixed.value))
             and "value" not in one.attributes
         ):
             yield one

@@ -190,9 +190,9 @@ def _added(placed: Placed, name: str, declaration: Quantity, instance: Instance)
 def _branches(
     placed: Placed, arrows: Sequence[_Arrow], seen: Sequence[Any], inside: Any
 ) -> Iterator[Happening]:
-    """The branches of the chain of a mode: for each source those that fail, then those that act, by priority.
+    """The branches of a mode's chain: for each source state the refused transitions, then the others by priority.
 
-    Outside of what it is within a mode goes back to its start; what acts inside lets changes of the outer one go first.
+    A nested mode without history returns to its start when the outer state is left. Transitions of the outer mode go first.
     """
     waits = inside is not None
     if waits and not placed.declaration.history:

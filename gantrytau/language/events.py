@@ -4,7 +4,7 @@
 Discrete and the force of such a friction count as known in the equations, as inputs do; what they are is kept beside.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,15 @@ class Sampling:
     expression: Any
     period: Any
     start: Any = None
+
+
+@dataclass(frozen=True, eq=False)
+class Lawful:
+    """`by_law(found, law, given)`."""
+
+    found: Sequence[Any]
+    law: Callable[[float, np.ndarray], Sequence[float]]
+    given: Sequence[Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +140,18 @@ def sampled(variable: Any, expression: Any, *, period: Any, start: Any = None) -
     each other's new values.
     """
     return Sampling(variable, expression, period, start)
+
+
+def by_law(
+    found: Sequence[Any], law: Callable[[float, np.ndarray], Sequence[float]], given: Sequence[Any]
+) -> Lawful:
+    """State that sampled scalars take, instead of what `sampled` says, what a function of Python makes of other ones.
+
+    law(t, values of given behind the instant) -> values of found, at every instant of found; all have one period.
+    The same arguments must give the same values, however often it is asked: what it remembers goes by a counter among the
+    given. `simulate` calls it; what needs formulas refuses it.
+    """
+    return Lawful(tuple(found), law, tuple(given))
 
 
 def delay(x: Any, T: Any) -> ca.SX:

@@ -7,9 +7,9 @@ Priorities, `prioritize(x, 2)`, are left out.
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TypeGuard
 
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import is_call
 
 GUESSES = "parameter equation"  # the section of a single guess value, between declarations
 RESERVED = frozenset({"time", "Real", "Integer", "Boolean", "String"})
@@ -33,7 +33,7 @@ def without_guesses(sections: Iterable[tree.ClassSection]) -> tuple[tree.ClassSe
             if found is not None:
                 name, argument = found
                 said[name] = (*said.get(name, ()), argument)
-            elif not _is_call(getattr(item, "call", None), "prioritize"):
+            elif not is_call(getattr(item, "call", None), "prioritize"):
                 left.append(item)
         if not section.kind and kept and not kept[-1].kind:
             kept[-1] = replace(kept[-1], items=(*kept[-1].items, *left))
@@ -49,11 +49,11 @@ def _attribute(item: object) -> tuple[str, tree.Argument] | None:
     if not isinstance(item, tree.SimpleEquation):
         return None
     left, right = item.left, item.right
-    if _is_call(left, "guess"):
-        value = right.arguments[0] if _is_call(right, "prioritize") else right
+    if is_call(left, "guess"):
+        value = right.arguments[0] if is_call(right, "prioritize") else right
         return _argument(left.arguments[0], "start", value)
-    variable = left.arguments[0] if _is_call(left, "pre") else left
-    if _is_call(right, "guess") and right.arguments[0] == variable:
+    variable = left.arguments[0] if is_call(left, "pre") else left
+    if is_call(right, "guess") and right.arguments[0] == variable:
         return _argument(variable, "fixed", tree.BooleanLiteral(item.at, True))
     return None
 
@@ -71,10 +71,6 @@ def _argument(
     for member, _ in reversed(members):
         found = tree.Argument(at, (), member, tree.Modification(at, (found,), None), None)
     return first, found
-
-
-def _is_call(e: object, name: str) -> TypeGuard[tree.Call]:
-    return isinstance(e, tree.Call) and e.function.parts == ((name, ()),)
 
 
 def _with_attributes(item: Item, said: Mapping[str, tuple[tree.Argument, ...]]) -> Item:

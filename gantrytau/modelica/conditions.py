@@ -1,11 +1,11 @@
 """Conditions of `when` as they stand in a text, and what is asked for before an instant."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeGuard
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.references import dotted, nodes_of, references, whole_name
+from gantrytau.modelica.references import dotted, inner_items, nodes_of, references, whole_name
 
 BEFORE = frozenset({"pre", "edge", "change"})
 Items = Sequence[tree.EquationOrStatement]
@@ -15,7 +15,7 @@ BEHIND = "before_"  # and a variable: its value before an instant
 TURN = "turn_"  # and a variable: the parity of its changes
 
 
-def is_call(e: tree.Expression, name: str) -> bool:
+def is_call(e: object, name: str) -> TypeGuard[tree.Call]:
     """Whether an expression calls a function of that name."""
     return isinstance(e, tree.Call) and e.function.parts[0][0] == name
 
@@ -71,11 +71,7 @@ def calls_before(e: Any) -> Iterator[tree.Call]:
 def targets(items: Items) -> Iterator[str]:
     """Names of the variables that statements, or the equations in a `when`, set."""
     for item in items:
-        if isinstance(item, (tree.ForLoop, tree.WhileLoop)):
-            yield from targets(item.items)
-        elif isinstance(item, tree.Branching):
-            for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from targets(inner)
+        yield from targets(inner_items(item))
         left = item.left if isinstance(item, tree.SimpleEquation) else None
         several = left.items if isinstance(left, tree.OutputList) else (left,)
         for each in item.targets if isinstance(item, tree.Assignment) else several:
@@ -105,19 +101,15 @@ def whens_in(structure: Any) -> Iterator[tree.Branching]:
     for item in left:
         if isinstance(item, tree.Branching) and item.word == "when":
             yield item
-        elif isinstance(item, tree.Branching):
-            left += [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
-        elif isinstance(item, tree.ForLoop):
-            left += item.items
+        else:
+            left += inner_items(item)
 
 
 def checks_in(items: Items, inside: bool = False) -> Iterator[tree.Call]:
     """Calls of `assert`, and of `terminate` under a further condition, in a `when`."""
     for item in items:
-        if isinstance(item, tree.Branching):
-            for _, inner in (*item.branches, (None, item.otherwise or ())):
-                yield from checks_in(inner, True)
-        elif isinstance(item, tree.ProcedureCall) and (
+        yield from checks_in(inner_items(item), inside or isinstance(item, tree.Branching))
+        if isinstance(item, tree.ProcedureCall) and (
             is_call(item.call, "assert") or (inside and is_call(item.call, "terminate"))
         ):
             yield item.call
@@ -189,6 +181,15 @@ def chain_of(name: str, sections: Sequence[Any]) -> list[str]:
             return [name]
         found.append(other)
     return found if before else [name]
+
+
+def bound_pulses(declared: Mapping[str, Any]) -> Iterator[tree.EquationOrStatement]:
+    """What the components of a class that are declared as `b = sample(...)` amount to; declared: by name."""
+    for name, one in declared.items():
+        said = one.declaration.modification
+        if said is not None and said.value is not None and is_call(said.value, "sample"):
+            left = tree.ComponentReference(said.at, ((name, ()),))
+            yield from with_pulses([tree.SimpleEquation(said.at, None, None, "=", left, said.value)])
 
 
 def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:

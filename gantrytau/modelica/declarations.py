@@ -3,20 +3,8 @@
 from gantrytau.modelica import tree
 from gantrytau.modelica.expressions import ExpressionReader
 
-KINDS = frozenset(
-    [
-        "class",
-        "model",
-        "record",
-        "block",
-        "connector",
-        "type",
-        "package",
-        "function",
-        "operator",
-        "optimization",
-    ]
-)
+KINDS = frozenset({"class", "model", "record", "block", "connector", "type", "package"})
+KINDS |= {"function", "operator", "optimization"}
 BEFORE_KINDS = ("encapsulated", "partial", "pure", "impure", "expandable")
 CLASS_BEGINS = KINDS | frozenset(BEFORE_KINDS)
 ELEMENT_PREFIXES = ("redeclare", "final", "inner", "outer", "replaceable")
@@ -48,13 +36,11 @@ class DeclarationReader(ExpressionReader):
         self.expect("(")
         if self.take(")"):
             return ()
-        arguments: list[tree.AnyArgument] = []
-        while not arguments or self.take(","):
-            arguments.append(self.omission() if inherited and self.kind == "break" else self.modifier())
-        if self.kind != ")":
-            self.refuse("',' or ')'")
-        self.advance()
-        return tuple(arguments)
+        arguments = self.listed(
+            lambda: self.omission() if inherited and self.kind == "break" else self.modifier()
+        )
+        self.expect(")", "',' or ')'")
+        return arguments
 
     def optional_modification(self, inherited: bool = False) -> tuple[tree.AnyArgument, ...] | None:
         """Arguments in parentheses if there are any."""
@@ -122,21 +108,22 @@ class DeclarationReader(ExpressionReader):
 
     def component_clause(self, prefixes: tuple[str, ...], several: bool = True) -> tree.ComponentClause:
         """A type and its components, one in a modification."""
-        for words in TYPE_PREFIXES:
-            if self.kind in words:
-                prefixes += (self.advance(),)
+        prefixes += self.type_prefixes()
         at = self.at
         if self.kind not in ("name", "."):
             self.refuse("a type" if prefixes or not several else "a declaration, a class, or 'end'")
         type_name, subscripts = self.dotted_name(), self.array_subscripts()
-        components: list[tree.ComponentDeclaration] = []
-        while not components or (several and self.take(",")):
-            components.append(self.component_declaration(several))
-        return tree.ComponentClause(
-            at, prefixes, type_name, subscripts, tuple(components), self.constrained_by(prefixes)
+        components = (
+            self.listed(self.component_declaration) if several else (self.component_declaration(False),)
         )
+        constraint = self.constrained_by(prefixes)
+        return tree.ComponentClause(at, prefixes, type_name, subscripts, components, constraint)
 
-    def component_declaration(self, conditional: bool) -> tree.ComponentDeclaration:
+    def type_prefixes(self) -> tuple[str, ...]:
+        """`flow parameter input`, before a type."""
+        return tuple(self.advance() for words in TYPE_PREFIXES if self.kind in words)
+
+    def component_declaration(self, conditional: bool = True) -> tree.ComponentDeclaration:
         """A name with all that belongs to it."""
         at, name = self.at, self.expect("name")
         subscripts, modification = self.array_subscripts(), self.modification()
@@ -172,18 +159,13 @@ class DeclarationReader(ExpressionReader):
             body = tree.Enumeration(at, self.enumeration_literals())
         elif self.take("der"):
             self.expect("(")
-            function, inputs = self.dotted_name(), []
-            while not inputs or self.kind == ",":
-                self.expect(",")
-                inputs.append(self.expect("name"))
+            function = self.dotted_name()
+            self.expect(",")
+            inputs = self.listed(lambda: self.expect("name"))
             self.expect(")")
-            body = tree.DerivativeClass(at, function, tuple(inputs))
+            body = tree.DerivativeClass(at, function, inputs)
         else:
-            prefixes: tuple[str, ...] = ()
-            for words in TYPE_PREFIXES:
-                if self.kind in words:
-                    prefixes += (self.advance(),)
-            at = self.at
+            prefixes, at = self.type_prefixes(), self.at
             if self.kind not in ("name", "."):
                 self.refuse("a class, 'enumeration' or 'der'")
             name, subscripts = self.dotted_name(), self.array_subscripts()
@@ -193,13 +175,13 @@ class DeclarationReader(ExpressionReader):
     def enumeration_literals(self) -> tuple[tree.EnumerationLiteral, ...] | None:
         """`(a "first", b)`; None for `(:)`."""
         self.expect("(")
-        literals: list[tree.EnumerationLiteral] | None = None
+        literals = None
         if not self.take(":"):
-            literals = []
-            while self.kind != ")" and (not literals or self.take(",")):
-                at, name = self.at, self.expect("name")
-                literals.append(tree.EnumerationLiteral(at, *self.description(), name))
-        if self.kind != ")":
-            self.refuse("',' or ')'")
-        self.advance()
-        return None if literals is None else tuple(literals)
+            literals = self.listed(self.enumeration_literal) if self.kind != ")" else ()
+        self.expect(")", "',' or ')'")
+        return literals
+
+    def enumeration_literal(self) -> tree.EnumerationLiteral:
+        """`a "first"`."""
+        at, name = self.at, self.expect("name")
+        return tree.EnumerationLiteral(at, *self.description(), name)

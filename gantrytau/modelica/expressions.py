@@ -13,6 +13,7 @@ PRECEDENCE = {
     **dict.fromkeys(("^", ".^"), POWER),
 }
 SIGNS = frozenset({"+", "-", ".+", ".-"})
+AFTER_NAMED = "',' and a named argument, or ')'"
 NAMES = frozenset({"name", "der", "initial", "pure", "."})  # a reference or a call begins with these
 
 
@@ -78,16 +79,17 @@ class ExpressionReader(Tokens):
             return self.parentheses()
         if kind == "{":
             self.advance()
-            items, iterators = self.array_arguments()
+            if self.kind == "}":
+                self.refuse("an expression; an empty array is written fill(0, 0)")
+            items = self.listed(self.argument)
+            iterators = self.for_indices() if self.kind == "for" and len(items) == 1 else ()
             self.expect("}")
             return tree.ArrayConstructor(at, items, iterators)
         if kind == "[":
             self.advance()
-            rows = [self.expression_list()]
-            while self.take(";"):
-                rows.append(self.expression_list())
+            rows = self.listed(self.expression_list, ";")
             self.expect("]")
-            return tree.Matrix(at, tuple(rows))
+            return tree.Matrix(at, rows)
         if kind == "end" and self.subscripts:
             return tree.Mark(at, self.advance())
         return self.refuse("an expression")
@@ -114,13 +116,15 @@ class ExpressionReader(Tokens):
         if not self.take("["):
             return ()
         self.subscripts += 1
-        items: list[tree.Expression] = []
-        while not items or self.take(","):
-            at = self.at
-            items.append(tree.Mark(at, ":") if self.take(":") else self.expression())
+        items = self.listed(self.subscript)
         self.subscripts -= 1
         self.expect("]")
-        return tuple(items)
+        return items
+
+    def subscript(self) -> tree.Expression:
+        """An expression, or `:` for all indices."""
+        at = self.at
+        return tree.Mark(at, ":") if self.take(":") else self.expression()
 
     def call(self, function: tree.ComponentReference) -> tree.Call:
         """The arguments of a call, in parentheses."""
@@ -130,7 +134,7 @@ class ExpressionReader(Tokens):
         iterators: tuple[tree.Iterator, ...] = ()
         while self.kind != ")":
             if self.kind == "name" and self.next_kind == "=":
-                named = self.named_arguments()
+                named = self.listed(self.named_argument)
                 break
             arguments.append(self.argument())
             if self.kind == "for" and len(arguments) == 1:
@@ -140,14 +144,8 @@ class ExpressionReader(Tokens):
                 break
             if self.kind == ")":
                 self.refuse("an argument")
-        self.end_of_arguments(bool(named), bool(iterators))
+        self.expect(")", "')'" if iterators else AFTER_NAMED if named else "',' or ')'")
         return tree.Call(function.at, function, tuple(arguments), named, iterators)
-
-    def end_of_arguments(self, named: bool, iterators: bool) -> None:
-        """The `)` of a call."""
-        if self.kind != ")":
-            self.refuse("')'" if iterators else "',' and a named argument, or ')'" if named else "',' or ')'")
-        self.advance()
 
     def argument(self) -> tree.Expression:
         """An argument: an expression, or a function with some inputs bound."""
@@ -156,57 +154,37 @@ class ExpressionReader(Tokens):
             return self.expression()
         name = self.dotted_name()
         self.expect("(")
-        named = self.named_arguments() if self.kind != ")" else ()
-        self.end_of_arguments(named=True, iterators=False)
+        named = self.listed(self.named_argument) if self.kind != ")" else ()
+        self.expect(")", AFTER_NAMED)
         return tree.PartialCall(at, name, named)
 
-    def named_arguments(self) -> tuple[tuple[str, tree.Expression], ...]:
-        """`a = 1, b = 2`."""
-        named: list[tuple[str, tree.Expression]] = []
-        while not named or self.take(","):
-            name = self.expect("name")
-            self.expect("=")
-            named.append((name, self.argument()))
-        return tuple(named)
+    def named_argument(self) -> tuple[str, tree.Expression]:
+        """`a = 1`."""
+        name = self.expect("name")
+        self.expect("=")
+        return name, self.argument()
 
     def for_indices(self) -> tuple[tree.Iterator, ...]:
         """`for i in 1:3, j`."""
         self.expect("for")
-        indices: list[tree.Iterator] = []
-        while not indices or self.take(","):
-            name = self.expect("name")
-            indices.append((name, self.expression() if self.take("in") else None))
-        return tuple(indices)
+        return self.listed(self.iterator)
 
-    def array_arguments(self) -> tuple[tuple[tree.Expression, ...], tuple[tree.Iterator, ...]]:
-        """The elements of an array, or one with iterators."""
-        if self.kind == "}":
-            self.refuse("an expression; an empty array is written fill(0, 0)")
-        first = self.argument()
-        if self.kind == "for":
-            return (first,), self.for_indices()
-        items = [first]
-        while self.take(","):
-            items.append(self.argument())
-        return tuple(items), ()
+    def iterator(self) -> tree.Iterator:
+        """`i in 1:3`, or `j`."""
+        return self.expect("name"), self.expression() if self.take("in") else None
 
     def expression_list(self) -> tuple[tree.Expression, ...]:
         """Expressions with commas between them."""
-        items = [self.expression()]
-        while self.take(","):
-            items.append(self.expression())
-        return tuple(items)
+        return self.listed(self.expression)
 
     def parentheses(self) -> tree.Expression:
         """An expression in parentheses, with subscripts behind them too, or a list of outputs."""
         at = self.at
         self.advance()
-        items: list[tree.Expression | None] = []
-        while not items or self.take(","):
-            items.append(None if self.kind in (",", ")") else self.expression())
+        items = self.listed(lambda: None if self.kind in (",", ")") else self.expression())
         self.expect(")")
         first = items[0]
-        array = tree.OutputList(at, tuple(items)) if len(items) > 1 or first is None else first
+        array = tree.OutputList(at, items) if len(items) > 1 or first is None else first
         return tree.Subscripted(at, array, self.array_subscripts()) if self.kind == "[" else array
 
     def dotted_name(self) -> str:

@@ -57,15 +57,11 @@ class Parser(EquationReader):
                 classes.append(self.class_definition(final))
                 self.close()
             except Faulty:
-                self.next_class(start)
+                while self.kind and (self.i <= start or self.kind not in CLASS_BEGINS):
+                    self.advance()
         if not classes and not self.faults and self.unclosed is None:
             self.note(self.at, "found no class, expected 'within' or a class")
         return tree.StoredDefinition(0, within, tuple(classes), self.source)
-
-    def next_class(self, start: int) -> None:
-        """Go on behind a fault outside of classes: at the next word that begins one."""
-        while self.kind and (self.i <= start or self.kind not in CLASS_BEGINS):
-            self.advance()
 
     def class_definition(self, prefixes: tuple[str, ...]) -> tree.ClassDefinition:
         """A class of any kind; one without a name is read all the same, to see what else is wrong."""
@@ -107,13 +103,18 @@ class Parser(EquationReader):
             _, kind, items = sections[-1]
             try:
                 if self.kind == "annotation":
-                    annotation = self.class_annotation(annotation)
+                    if annotation is not None:
+                        self.note(self.at, "found a second annotation of this class, expected one")
+                    annotation = self.annotation()
+                    self.close()
                 elif self.kind == "external":
                     if external is not None:
                         self.note(self.at, "found a second external function, expected one")
                     external = self.external_function()
                 elif self.section_begins():
-                    sections.append((self.at, self.section_kind(), []))
+                    begin, first = self.at, self.advance()
+                    kind = f"{first} {self.advance()}" if first == "initial" else first
+                    sections.append((begin, kind, []))
                 elif self.kind == "parameter" and self.next_kind == "equation":
                     sections.append((self.at, f"{self.advance()} {self.advance()}", [self.item("equation")]))
                     sections.append((self.at, "", []))
@@ -139,10 +140,6 @@ class Parser(EquationReader):
         shown = without_guesses(shown) if self.source.base else shown
         return tree.Composition(at, extends, arguments, shown, external), annotation
 
-    def section_kind(self) -> str:
-        """The words that begin a section."""
-        return f"{self.advance()} {self.advance()}" if self.kind == "initial" else self.advance()
-
     def forgotten_section(self) -> str:
         """The section whose first word is missing before an equation or a statement; "" before an element."""
         i, kinds = self.i, self.kinds
@@ -161,14 +158,6 @@ class Parser(EquationReader):
             word = f"end {self.advance()}"
         self.note(self.starts[self.i - len(word.split())], f"found '{word}', to which no block belongs")
         self.take(";")
-
-    def class_annotation(self, before: tree.Annotation) -> tree.Annotation:
-        """The annotation of a class, which has one."""
-        if before is not None:
-            self.note(self.at, "found a second annotation of this class, expected one")
-        found = self.annotation()
-        self.close()
-        return found
 
     def end_of_class(self) -> None:
         """`end name` of a class; the name of an enclosing class ends that class, as the inner one lacks its `end`."""
@@ -211,11 +200,8 @@ class Parser(EquationReader):
         elif alias is None and self.kind == "." and self.next_kind == "{":
             self.advance()
             self.advance()
-            listed = [self.expect("name")]
-            while self.take(","):
-                listed.append(self.expect("name"))
+            names = self.listed(lambda: self.expect("name"))
             self.expect("}")
-            names = tuple(listed)
         return tree.Import(at, *self.description(), name, alias, names)
 
     def extends_clause(self) -> tree.Extends:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
@@ -20,7 +20,14 @@ def nodes_of(expression: Any) -> Iterator[tree.TreeNode]:
         elif isinstance(one, (tuple, list)):
             left += reversed(one)
         elif isinstance(one, tree.TreeNode):
-            left += [getattr(one, name) for name in [*type(one).__slots__][::-1]]
+            left += [getattr(one, name) for name in one.own[::-1]]
+
+
+def inner_items(item: tree.EquationOrStatement) -> list[tree.EquationOrStatement]:
+    """The equations or statements in a loop, an `if` or a `when`; none in another one."""
+    if isinstance(item, tree.Branching):
+        return [one for _, items in item.branches for one in items] + [*(item.otherwise or ())]
+    return [*item.items] if isinstance(item, (tree.ForLoop, tree.WhileLoop)) else []
 
 
 def from_left(e: tree.Binary) -> list[tree.Binary]:
@@ -63,7 +70,7 @@ def called_function(call: tree.Call, reader: Any) -> tuple[str, Any]:
     if name.startswith("Connections."):
         return name, None
     if (component := component_of(call, reader)) is not None:
-        owner, last = component.scope, name.rpartition(".")[2]
+        owner, last = component.structure.scope, name.rpartition(".")[2]
         if (found := owner.inherited_class(last)) is None:
             raise ModelError(
                 f"found '{name}', expected a function of {owner.name}{did_you_mean(last, owner.names())}"
@@ -95,7 +102,7 @@ def declared_shape(e: tree.Expression, reader: Any) -> tuple[int, ...] | None:
     """The sizes of a component by its plain name, which say nothing of its value; None for all else."""
     name = dotted(e)
     known = name and "." not in name and name not in reader.local and reader.members.has(name)
-    return reader.members.shape(name) if known else None
+    return reader.members.structure.shape(name) if known else None
 
 
 def connects_in(items: Iterable[Any]) -> tuple[Any, ...]:
@@ -121,44 +128,32 @@ def holding(members: Any, found: Iterable[tree.ComponentReference]) -> Any:
     return members
 
 
-class Members(Protocol):
-    """An instance of a class: a component, a package with its constants, or what a function computes with."""
+class Members:
+    """An instance of a class, a package with its constants, or the members of a function; structure: what it consists of.
 
-    @property
-    def instance_name(self) -> str:
-        """Its path behind the name of the whole model."""
-        ...
+    What has no symbols, as a package, has no values before an instant.
+    """
+
+    structure: Any
 
     def has(self, name: str) -> bool:
         """Whether its class has a component of that name."""
-        ...
-
-    def member(self, name: str) -> Any:
-        """The value of a component."""
+        return name in self.structure.scope.elements
 
     def names(self) -> Sequence[str]:
         """Names of its components."""
-        ...
+        return [*self.structure.scope.elements]
 
-    def shape(self, name: str) -> tuple[int, ...] | None:
-        """The sizes of a component; None where only its value has them."""
+    def member(self, name: str) -> Any:
+        """The value of a component."""
+        raise NotImplementedError
 
     def next_sample(self, call: tree.Call) -> Any:
         """The next instant of a `sample`; of `initial()` whether it is the start, 1 or 0."""
+        raise ModelError(f"found {call.function.parts[0][0]}() in a value, expected it among equations")
 
     def before(self, name: str, asked: str) -> Any:
         """The Discrete that follows a variable of that dotted name, as `pre`, `edge` or `change` asks; None without one."""
 
     def turn(self, name: str) -> Any:
         """The parity of the changes of a variable that a Discrete follows; None for another one."""
-
-    def type_of(self, reference: tree.ComponentReference) -> str:
-        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
-        ...
-
-    def values_of(self, reference: tree.ComponentReference) -> range | None:
-        """The values of an Integer with min and max, 0 and 1 of a Boolean; None for another Integer."""
-
-    def is_fixed(self, expression: tree.Expression) -> bool:
-        """Whether it holds parameters and constants only."""
-        ...

@@ -1,11 +1,12 @@
 """Expressions that must be known before there are symbols: ranges, subscripts, sizes, arguments of some functions."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica import tree
-from gantrytau.modelica.references import called_function, nodes_of, references
+from gantrytau.modelica.references import called_function, inner_items, nodes_of, references
 
 SIZES: Mapping[str, int] = {"zeros": 0, "ones": 0, "fill": 1, "identity": 0, "linspace": 2}
 
@@ -14,29 +15,23 @@ def ask(
     structure: Any, item: tree.EquationOrStatement, scope: Any, local: frozenset[str] = frozenset()
 ) -> None:
     """Fold the parameters of an instance that must be known in an equation or statement of a class."""
-    inside: list[tree.EquationOrStatement] = []
     if isinstance(item, tree.ForLoop):
         for name, over in item.iterators:
             _ask_names(structure, over, scope, local)
             local |= {name}
-        inside += item.items
-    elif isinstance(item, tree.Branching):
-        for test, items in item.branches:
-            if item.word == "if":
-                _ask_names(structure, test, scope, local)
-            inside += items
-        inside += item.otherwise or ()
-    else:
+    elif isinstance(item, tree.Branching) and item.word == "if":
+        for test, _ in item.branches:
+            _ask_names(structure, test, scope, local)
+    elif not isinstance(item, tree.Branching):
         ask_for_shapes(structure, item, scope, local)
-    for one in inside:
+        return
+    for one in inner_items(item):
         ask(structure, one, scope, local)
 
 
 def ask_for_shapes(structure: Any, item: Any, scope: Any, local: frozenset[str] = frozenset()) -> None:
     """Fold the parameters in ranges, subscripts, sizes and arguments of an expression."""
-    for one in shaping(
-        item, scope, lambda around, call: called_function(call, structure.interpreter(around))[1]
-    ):
+    for one in shaping(item, scope, structure):
         before = set(structure.read)
         try:
             _ask_names(structure, one, scope, local)
@@ -72,11 +67,8 @@ def _ask_names(structure: Any, expression: Any, scope: Any, local: frozenset[str
             structure.interpreter(scope).value(tree.ComponentReference(one.at, whole))
 
 
-Lookup = Callable[[Any, tree.Call], Any]  # the class of the function of a call in a class, or None
-
-
-def shaping(item: Any, scope: Any, called: Lookup) -> Iterator[tree.Expression]:
-    """The expressions in an equation or a value that must be known; called: the function of a call in a class."""
+def shaping(item: Any, scope: Any, structure: Any) -> Iterator[tree.Expression]:
+    """The expressions that must be known in an equation or a value of a class."""
     for node in nodes_of(item):
         if isinstance(node, tree.RangeExpression):
             yield node
@@ -86,22 +78,21 @@ def shaping(item: Any, scope: Any, called: Lookup) -> Iterator[tree.Expression]:
             yield from node.subscripts
         elif isinstance(node, tree.Call) and node.function.parts[-1][0] in SIZES:
             yield from node.arguments[SIZES[node.function.parts[-1][0]] :]
-        elif isinstance(node, tree.Call) and (function := _function(scope, node, called)) is not None:
+        elif isinstance(node, tree.Call) and (function := _function(node, scope, structure)):
             inputs = {n: e for n, e in function.elements.items() if "input" in e.clause.prefixes}
             given = {**dict(zip(inputs, node.arguments, strict=False)), **dict(node.named)}
-            every = _needs_numbers(function, called, set())
+            every = _needs_numbers(function, structure, set())
             whole = {n for n, e in inputs.items() if every or e.clause.type == "Integer"}
             yield from (e for n, e in given.items() if n in whole)
 
 
-def _function(scope: Any, call: tree.Call, called: Lookup) -> Any:
-    try:
-        return called(scope, call)
-    except ModelError:
-        return None  # told where its value is asked for
+def _function(call: tree.Call, scope: Any, structure: Any) -> Any:
+    """The class of the function that is called in a class; None for one of the language."""
+    with suppress(ModelError):  # told where its value is asked for
+        return called_function(call, structure.interpreter(scope))[1]
 
 
-def _needs_numbers(function: Any, called: Lookup, seen: set[int]) -> bool:
+def _needs_numbers(function: Any, structure: Any, seen: set[int]) -> bool:
     """Whether it needs numbers: it is external, computes the length of a loop, or calls such a function."""
     if id(function) in seen:
         return False
@@ -112,9 +103,7 @@ def _needs_numbers(function: Any, called: Lookup, seen: set[int]) -> bool:
     values = [(e.modifier.value, e.modifier.scope) for e in function.elements.values()]
     for item, scope in (*values, *((one.items, one.scope) for one in function.sections)):
         for node in nodes_of(item):
-            if isinstance(node, tree.WhileLoop):
-                return True
-            inner = _function(scope, node, called) if isinstance(node, tree.Call) else None
-            if inner is not None and _needs_numbers(inner, called, seen):
+            inner = _function(node, scope, structure) if isinstance(node, tree.Call) else None
+            if isinstance(node, tree.WhileLoop) or (inner and _needs_numbers(inner, structure, seen)):
                 return True
     return False

@@ -1,7 +1,8 @@
 """The tokens of a text, and a cursor over them that collects faults."""
 
 import re
-from typing import NoReturn
+from collections.abc import Callable
+from typing import NoReturn, TypeVar
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.modelica.base_modelica import decoded
@@ -39,6 +40,7 @@ UNCLOSED = {
 SECTIONS = frozenset({"public", "protected", "equation", "algorithm", "constraint", "external"})
 BLOCKS = frozenset({"if", "for", "when", "while"})
 MOST = 20  # messages of a file
+Item = TypeVar("Item")
 
 
 def spelled(name: str) -> str:
@@ -119,11 +121,18 @@ class Tokens:
         self.advance()
         return True
 
-    def expect(self, kind: str) -> str:
-        """The text of the present token, which must be of this kind, and is passed."""
+    def expect(self, kind: str, told: str = "") -> str:
+        """The text of the present token, which must be of this kind, and is passed; told: what a message expects."""
         if self.kind != kind:
-            self.refuse({"name": "a name", "string": "a string"}.get(kind, f"'{kind}'"))
+            self.refuse(told or {"name": "a name", "string": "a string"}.get(kind, f"'{kind}'"))
         return self.advance()
+
+    def listed(self, read: Callable[[], Item], separator: str = ",") -> tuple[Item, ...]:
+        """One item or more with separators between them."""
+        found = [read()]
+        while self.take(separator):
+            found.append(read())
+        return tuple(found)
 
     def note(self, at: int, words: str) -> None:
         """A fault from which reading goes on at once; the first at its place tells it."""

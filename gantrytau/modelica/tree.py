@@ -5,24 +5,28 @@ Trees are equal without regard to offsets. Names with dots are strings, texts of
 """
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias, dataclass_transform
 
 from gantrytau.modelica.source import SourceText
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass(frozen=True)
 class TreeNode:
-    """A part of a tree."""
+    """A part of a tree. Its subclasses are frozen dataclasses; own: the fields beyond those that they inherit."""
 
+    own: ClassVar[tuple[str, ...]] = ()
     at: int = field(compare=False, repr=False)
 
+    def __init_subclass__(cls) -> None:
+        cls.own = tuple(vars(cls).get("__annotations__", ()))
+        dataclass(frozen=True)(cls)
 
-@dataclass(frozen=True, slots=True)
+
 class Expression(TreeNode):
     """What has a value."""
 
 
-@dataclass(frozen=True, slots=True)
 class Number(Expression):
     """An unsigned number as it is written."""
 
@@ -34,35 +38,30 @@ class Number(Expression):
         return int(self.text) if self.text.isdigit() else float(self.text)
 
 
-@dataclass(frozen=True, slots=True)
 class StringLiteral(Expression):
     """What stands between two quotes, escapes as they are written."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
 class BooleanLiteral(Expression):
     """`true` or `false`."""
 
     value: bool
 
 
-@dataclass(frozen=True, slots=True)
 class Mark(Expression):
     """A word that stands for a value: `end` and `:` in subscripts, `break` in modifications."""
 
     word: str
 
 
-@dataclass(frozen=True, slots=True)
 class ComponentReference(Expression):
     """Pairs of a name and its subscripts; the first name is "" after a leading dot."""
 
     parts: tuple[tuple[str, tuple[Expression, ...]], ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Call(Expression):
     """Positional arguments, then named ones; or one argument with iterators. In Optimica also `x(t)` of a variable."""
 
@@ -72,7 +71,6 @@ class Call(Expression):
     iterators: "tuple[Iterator, ...]"
 
 
-@dataclass(frozen=True, slots=True)
 class PartialCall(Expression):
     """`function f(a=1)` as an argument: a function with some of its inputs bound."""
 
@@ -80,7 +78,6 @@ class PartialCall(Expression):
     named: tuple[tuple[str, Expression], ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Unary(Expression):
     """A sign or `not` before an operand."""
 
@@ -88,7 +85,6 @@ class Unary(Expression):
     operand: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class Binary(Expression):
     """An operator between two operands."""
 
@@ -97,7 +93,6 @@ class Binary(Expression):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class RangeExpression(Expression):
     """`start : stop` or `start : step : stop`."""
 
@@ -106,7 +101,6 @@ class RangeExpression(Expression):
     stop: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class Conditional(Expression):
     """`if c then a elseif d then b else e`: pairs of condition and value, and the last value."""
 
@@ -114,7 +108,6 @@ class Conditional(Expression):
     otherwise: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class ArrayConstructor(Expression):
     """`{a, b}`, or one element with iterators, `{a for i in 1:3}`."""
 
@@ -122,21 +115,18 @@ class ArrayConstructor(Expression):
     iterators: "tuple[Iterator, ...]"
 
 
-@dataclass(frozen=True, slots=True)
 class Matrix(Expression):
     """`[a, b; c, d]`, row by row."""
 
     rows: tuple[tuple[Expression, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
 class OutputList(Expression):
     """`(a, , c)`: several results of a function, of which some are left out."""
 
     items: tuple[Expression | None, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Subscripted(Expression):
     """`(a + b)[1]`."""
 
@@ -147,7 +137,6 @@ class Subscripted(Expression):
 Iterator: TypeAlias = tuple[str, Expression | None]
 
 
-@dataclass(frozen=True, slots=True)
 class Modification(TreeNode):
     """`(a=1) = value`; arguments are None without parentheses."""
 
@@ -155,7 +144,6 @@ class Modification(TreeNode):
     value: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
 class Argument(TreeNode):
     """`each final name(...) = value "description"`; prefixes are of `each` and `final`."""
 
@@ -165,7 +153,6 @@ class Argument(TreeNode):
     description: str | None
 
 
-@dataclass(frozen=True, slots=True)
 class Redeclaration(TreeNode):
     """`redeclare`, `replaceable` or both in a modification; the prefixes of the element say which."""
 
@@ -173,7 +160,6 @@ class Redeclaration(TreeNode):
     element: "ComponentClause | ClassDefinition"
 
 
-@dataclass(frozen=True, slots=True)
 class Omission(TreeNode):
     """`break name` or `break connect(a, b)` in the modification of an `extends`."""
 
@@ -184,7 +170,6 @@ AnyArgument: TypeAlias = Argument | Redeclaration | Omission
 Annotation: TypeAlias = tuple[AnyArgument, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
 class Described(TreeNode):
     """What has a description and an annotation; None where there is none."""
 
@@ -192,7 +177,6 @@ class Described(TreeNode):
     annotation: Annotation
 
 
-@dataclass(frozen=True, slots=True)
 class ComponentDeclaration(Described):
     """One component of a clause: `r[3](each unit="m") = zeros(3) if present "description"`."""
 
@@ -202,7 +186,6 @@ class ComponentDeclaration(Described):
     condition: Expression | None
 
 
-@dataclass(frozen=True, slots=True)
 class ConstrainedBy(Described):
     """`constrainedby Type(...)`."""
 
@@ -210,7 +193,6 @@ class ConstrainedBy(Described):
     arguments: tuple[AnyArgument, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
 class ComponentClause(TreeNode):
     """`parameter Type[3] a, b`; prefixes from `redeclare` to `output` in the order of the grammar."""
 
@@ -221,7 +203,6 @@ class ComponentClause(TreeNode):
     constraint: ConstrainedBy | None
 
 
-@dataclass(frozen=True, slots=True)
 class ClassDefinition(Described):
     """A class: `kind` is one word, `model`; all before it, `partial` or `replaceable`, are prefixes."""
 
@@ -232,7 +213,6 @@ class ClassDefinition(Described):
     constraint: ConstrainedBy | None
 
 
-@dataclass(frozen=True, slots=True)
 class Composition(TreeNode):
     """From the name to `end name`. extends: whether it is `class extends name(arguments)`.
 
@@ -245,7 +225,6 @@ class Composition(TreeNode):
     external: "ExternalFunction | None"
 
 
-@dataclass(frozen=True, slots=True)
 class ClassSection(TreeNode):
     """A section; kind: "", "public", "protected", "equation", "initial equation", "algorithm", "constraint", ..."""
 
@@ -253,7 +232,6 @@ class ClassSection(TreeNode):
     items: "tuple[Element | EquationOrStatement, ...]"
 
 
-@dataclass(frozen=True, slots=True)
 class ExternalFunction(TreeNode):
     """`external "C" result = function(arguments) annotation(...)`; function is "" where none is given."""
 
@@ -264,7 +242,6 @@ class ExternalFunction(TreeNode):
     annotation: Annotation
 
 
-@dataclass(frozen=True, slots=True)
 class ShortClass(TreeNode):
     """`= input Type[3](...)` of a short class."""
 
@@ -274,21 +251,18 @@ class ShortClass(TreeNode):
     arguments: tuple[AnyArgument, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
 class EnumerationLiteral(Described):
     """One value of an enumeration."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
 class Enumeration(TreeNode):
     """`= enumeration(a, b)`; None for `enumeration(:)`."""
 
     literals: tuple[EnumerationLiteral, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
 class DerivativeClass(TreeNode):
     """`= der(f, x, y)`: the partial derivative of a function."""
 
@@ -296,7 +270,6 @@ class DerivativeClass(TreeNode):
     inputs: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class Import(Described):
     """`import alias = name`, or `import name.{names}`, where ("*",) stands for all names."""
 
@@ -305,7 +278,6 @@ class Import(Described):
     names: tuple[str, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
 class Extends(TreeNode):
     """`extends Type(...)`."""
 
@@ -317,7 +289,6 @@ class Extends(TreeNode):
 Element: TypeAlias = ClassDefinition | ComponentClause | Import | Extends
 
 
-@dataclass(frozen=True, slots=True)
 class SimpleEquation(Described):
     """`left = right`; in constraints of Optimica also `left <= right` and `left >= right`, by `relation`."""
 
@@ -326,7 +297,6 @@ class SimpleEquation(Described):
     right: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class ConnectEquation(Described):
     """`connect(a, b)`."""
 
@@ -334,14 +304,12 @@ class ConnectEquation(Described):
     b: ComponentReference
 
 
-@dataclass(frozen=True, slots=True)
 class ProcedureCall(Described):
     """A call as an equation or statement of its own: `assert`, `reinit`."""
 
     call: Call
 
 
-@dataclass(frozen=True, slots=True)
 class Assignment(Described):
     """`x := value`, or `(a, , b) := f(...)` where several is true."""
 
@@ -350,14 +318,12 @@ class Assignment(Described):
     value: Expression
 
 
-@dataclass(frozen=True, slots=True)
 class Leave(Described):
     """`break` or `return`."""
 
     word: str
 
 
-@dataclass(frozen=True, slots=True)
 class Branching(Described):
     """An `if` or a `when` by `word`: pairs of a condition and what holds then; otherwise is None without `else`."""
 
@@ -366,7 +332,6 @@ class Branching(Described):
     otherwise: "tuple[EquationOrStatement, ...] | None"
 
 
-@dataclass(frozen=True, slots=True)
 class ForLoop(Described):
     """`for i in 1:3, j loop`."""
 
@@ -374,7 +339,6 @@ class ForLoop(Described):
     items: "tuple[EquationOrStatement, ...]"
 
 
-@dataclass(frozen=True, slots=True)
 class WhileLoop(Described):
     """`while condition loop`."""
 
@@ -387,7 +351,6 @@ EquationOrStatement: TypeAlias = (
 )
 
 
-@dataclass(frozen=True, slots=True)
 class StoredDefinition(TreeNode):
     """A file: `within` is None where it is not said, "" for the top; classes from the first to the last."""
 

@@ -299,9 +299,7 @@ class Run:
 
         def look(point: Point) -> SwitchMargins:
             x, z, t, w = point
-            return switches.gaps(
-                switches.look(x[None], z[None], np.array([t]), w[None], self.changes.sizes), modes
-            )
+            return switches.gaps(self.changes.look(x[None], z[None], np.array([t]), w[None]), modes)
 
         far = self.changes.point(k + 1) if found.certain else self.integrators.step(low, found.guess - low[2])
         turned = found.certain or look(far).below.any()

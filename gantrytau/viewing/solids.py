@@ -89,7 +89,7 @@ def ghosts(film: Film) -> Iterator[Solid]:
 
 
 def solids(film: Film, beside: Film | None = None) -> Iterator[Solid]:
-    """All solids that are seen; what has no extent is left out. beside: a film in whose sizes they are shown."""
+    """The visible solids of a film; shapes without extent are left out. `beside`: another film that sets the scale."""
     low, high = extent(film if beside is None else beside)
     size = float(np.linalg.norm(high - low)) or 1.0
     arrows = (_force(film, shape) for shape in film.shapes if isinstance(shape, ForceArrow))

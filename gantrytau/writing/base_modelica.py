@@ -14,6 +14,7 @@ import numpy as np
 
 from gantrytau.border.refusal import ModelError
 from gantrytau.compiler.translated import Translated
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.flattening.flat_model import FlatParameter, FlatVariable
 from gantrytau.language.declarations import StateSelect
 from gantrytau.language.statements import Equation
@@ -58,6 +59,7 @@ def independent_equations(dae: Translated) -> list[Equation]:
 
 class _Writer:
     def __init__(self, dae: Translated):
+        refuse_events(dae.flat, "laws")
         self.dae, self.flat, self.graph = dae, dae.flat, Graph()
         self.equations = independent_equations(dae)
         self.auxiliaries: list[str] = []

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-from gantrytau.flattening.flat_model import Delay, FlatModel, Sampled, StickSlip, When
+from gantrytau.flattening.flat_model import Delay, FlatModel, Sampled, SampledLaw, StickSlip, When
 from gantrytau.writing.graph import Graph, Node
 from gantrytau.writing.sections import symbol_names
 from gantrytau.writing.subexpressions import located, written
@@ -61,6 +61,7 @@ def at_instants(flat: FlatModel) -> tuple[AtInstants, ...]:
     """All statements on instants of a model: sampled, friction that sticks, whens, delays."""
     return (
         *map(_sampled, flat.sampled),
+        *map(_law, flat.laws),
         *map(_friction, flat.frictions),
         *map(_when, flat.whens),
         *map(_delayed, flat.delays),
@@ -103,6 +104,21 @@ def _sampled(one: Sampled) -> AtInstants:
     place = one.path or "the model"
     says = ("sampled: ", Mention(one.name), " = ", one.expression)
     return AtInstants(place, says, ("every ", one.period, f" s, from {place}"), (one.name,), one.name)
+
+
+def _law(one: SampledLaw) -> AtInstants:
+    place = one.path or "the model"
+    says = (
+        "law: a function of Python sets ",
+        *_mentioned(one.found),
+        " instead, from ",
+        *_mentioned(one.given),
+    )
+    return AtInstants(place, says, (f"from {place}",), one.found, one.label)
+
+
+def _mentioned(names: Iterable[str]) -> list[Piece]:
+    return [piece for name in names for piece in (", ", Mention(name))][1:]
 
 
 def _friction(one: StickSlip) -> AtInstants:

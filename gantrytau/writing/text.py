@@ -82,7 +82,9 @@ def _state(state: tuple[str, str]) -> str:
 def friction_lines(flat: FlatModel) -> list[str]:
     """Friction that sticks, line by line."""
     return [
-        line for one in at_instants(replace(flat, sampled=(), whens=(), delays=())) for line in _instant(one)
+        line
+        for one in at_instants(replace(flat, sampled=(), laws=(), whens=(), delays=()))
+        for line in _instant(one)
     ]
 
 

@@ -89,10 +89,7 @@ def _compiled(folder: Path, r: np.ndarray) -> tuple[Callable[[], None], np.ndarr
 
 def _others() -> Iterator[Row]:
     random = np.random.default_rng(1)
-    for name, robot in (
-        ("six links", SixLinkGantryTau(prototypes.D1)),
-        ("F1", F1GantryTau(prototypes.F1)),
-    ):
+    for name, robot in (("six links", SixLinkGantryTau(prototypes.D1)), ("F1", F1GantryTau(prototypes.F1))):
         kinematics = Kinematics(robot)
         count = 20_000
         q = kinematics.home.q + random.uniform(-0.1, 0.1, (count, len(kinematics.joints)))

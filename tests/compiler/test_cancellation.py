@@ -114,8 +114,7 @@ class Changing(Shared):
 
 
 @pytest.mark.parametrize(
-    ("model", "why"),
-    [(Repeated, "determines no unknown"), (Changing, "its factors change with the motion")],
+    ("model", "why"), [(Repeated, "determines no unknown"), (Changing, "its factors change with the motion")]
 )
 def test_equations_that_cannot_be_combined_are_named(model, why):
     with pytest.raises(StructureError, match=r"equation 1 and .*equation 2.* hold their highest") as told:

@@ -161,10 +161,7 @@ CASES = {
     "square and absolute": (one(lambda x: x**2 + fabs(x), 1.0, 2.0), {2.0: 1.0, 6.0: 2.0, -1.0: None}),
     "square and positive part": (one(lambda x: x**2 + ca.fmax(x, 0), 0.5, 2.0), {2.0: 1.0, 6.0: 2.0}),
     "sign": (one(lambda x: x + ca.sign(x), 1.0, 3.0), {3.0: 2.0, 0.0: 0.0, -3.0: -2.0, 0.5: None}),
-    "floor": (
-        one(lambda x: x + ca.floor(x), 1.5, 2.5),
-        {2.5: 1.5, 4.2: 2.2, -7.75: -3.75, 3.5: None},
-    ),
+    "floor": (one(lambda x: x + ca.floor(x), 1.5, 2.5), {2.5: 1.5, 4.2: 2.2, -7.75: -3.75, 3.5: None}),
     "slow steps": (one(lambda x: 4 * x + ca.ceil(x), 1.5, 8.0), {8.0: 1.5, 9.2: 1.8, -6.2: -1.3}),
     "stairs and a limit": (
         one(lambda x: x + 0.5 * ca.floor(x) + ca.fmin(x, 0), 0.5, 0.5),

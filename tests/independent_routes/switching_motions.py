@@ -24,11 +24,7 @@ END = 2.0  # s
 # slope and shift of s(z) below, between and above the borders of z
 SHAPES: dict[str, tuple[Any, tuple[float, ...], tuple[tuple[float, float], ...]]] = {
     "absolute": (fabs, (0.0,), ((-1.0, 0.0), (1.0, 0.0))),
-    "limited": (
-        lambda z: ca.fmin(ca.fmax(z, -0.5), 0.5),
-        (-0.5, 0.5),
-        ((0.0, -0.5), (1.0, 0.0), (0.0, 0.5)),
-    ),
+    "limited": (lambda z: ca.fmin(ca.fmax(z, -0.5), 0.5), (-0.5, 0.5), ((0.0, -0.5), (1.0, 0.0), (0.0, 0.5))),
     "jump": (lambda z: if_else(z > 0.1, 1.0, -0.5), (0.1,), ((0.0, -0.5), (0.0, 1.0))),
     "table": (
         lambda z: table(z, [-1.0, -0.25, 0.5, 1.0], [0.5, -0.4, 0.2, 0.2], outside="hold"),
@@ -43,7 +39,7 @@ SHAPES_OF_SINES: dict[str, tuple[Any, tuple[float, ...], tuple[tuple[float, floa
         lambda z: if_else(sin(DENSE * z) > 0.3, 1.0, -0.5),
         tuple((EDGES / DENSE).ravel().tolist()),  # for |z| < 6, beyond which it ends
         ((0.0, -0.5), *((0.0, level) for _ in EDGES for level in (1.0, -0.5))),
-    ),
+    )
 }
 ALL_SHAPES = SHAPES | SHAPES_OF_SINES
 

@@ -6,17 +6,7 @@ from typing import Any, cast
 
 import pytest
 
-from gantrytau import (
-    InitializationError,
-    Model,
-    ModelError,
-    Parameter,
-    Real,
-    Start,
-    der,
-    flatten,
-    translate,
-)
+from gantrytau import InitializationError, Model, ModelError, Parameter, Real, Start, der, flatten, translate
 from tests.language.test_modifications import Cell, Pack, Rack
 
 

@@ -16,8 +16,8 @@ def ran(tmp_path):
 
 
 PULSES = """model M
-  Boolean b, c(start=false);
-  Integer n(start=0), m(start=0);
+  Boolean b, c(start=false), d = sample(0, 0.3);
+  Integer n(start=0), m(start=0), k(start=0);
   discrete Real last(start=-1, fixed=true);
 equation
   b = sample(0.25, 0.5);
@@ -25,6 +25,9 @@ equation
   when b then
     n = pre(n) + 1;
     last = time;
+  end when;
+  when d then
+    k = pre(k) + 1;
   end when;
   when {c, initial()} then
     m = pre(m) + 1;
@@ -35,7 +38,7 @@ end M;
 
 def test_a_boolean_that_is_a_sample_is_true_at_its_instants_only(ran):
     found = ran(PULSES)
-    assert [found.final(name) for name in ("n", "m", "last", "b")] == [4, 5, 1.75, 0]
+    assert [found.final(name) for name in ("n", "m", "k", "last", "b", "d")] == [4, 5, 7, 1.75, 0, 0]
 
 
 CHOICES = """function first "index of the first true one, 0 without any, and the one behind it that is true"

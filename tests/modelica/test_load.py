@@ -235,7 +235,7 @@ def test_a_file_within_a_package_comes_before_it_and_names_the_class_of_its_name
         "end Lag;"
     )
     library = load_modelica(tmp_path / "use.mo", tmp_path / "lag.mo")
-    assert library.names == ("Lag.Lag", "Lag.Use")
+    assert library.names == tuple(library) == ("Lag.Lag", "Lag.Use")
     assert simulate(library["Lag.Use"](), stop=1.0)["x"][-1] == pytest.approx(np.exp(-2), rel=1e-7)
 
 
@@ -300,6 +300,26 @@ def test_attributes_of_a_type_are_those_of_each_element_of_an_array(tmp_path):
     )
     levels = simulate(load_modelica(tmp_path / "levels.mo")["Levels"](), stop=1.0, tolerance=1e-10)
     np.testing.assert_allclose([levels.final(f"h[{k}]") for k in (1, 2, 3)], 2 * np.exp(-1.0), rtol=1e-8)
+
+
+def test_some_elements_of_an_array_have_fixed_starts(tmp_path):
+    (tmp_path / "f.mo").write_text(
+        """model Halves Real x[2, 2](each start=1); equation der(x) = -x; end Halves;
+        model F
+          Halves h[2](x(start={{{1, 2}, {3, 4}}, {{5, 6}, {7, 8}}},
+            fixed={{{true, false}, {true, true}}, {{false, true}, {false, false}}}));
+        initial equation
+          sum(h[1].x) = 20; h[2].x[1, 1] = 9; h[2].x[2, :] = {h[1].x[1, 1], 0};
+        end F;
+        model G Real x[3](fixed={true, false}); equation der(x) = -x; end G;"""
+    )
+    library = load_modelica(tmp_path / "f.mo")
+    start = translate(library["F"]()).start
+    for k, wanted in ((1, [[1, 12], [3, 4]]), (2, [[9, 6], [1, 0]])):
+        found = [[start[f"h[{k}].x[{i},{j}]"] for j in (1, 2)] for i in (1, 2)]
+        np.testing.assert_allclose(found, wanted, atol=1e-9)
+    with pytest.raises(ModelError, match=r"x: fixed has shape \(2,\), expected \(3,\)"):
+        translate(library["G"]())
 
 
 def test_a_constraint_of_a_class_modifies_what_replaces_it(tmp_path):

@@ -5,6 +5,12 @@ import pytest
 
 from gantrytau import ModelError, SolveError, load_modelica, simulate, translate
 
+
+def loaded(folder, text: str):
+    (folder / "text.mo").write_text(text)
+    return load_modelica(folder / "text.mo")
+
+
 GRID = """package Grids
   connector Pin
     Real v;
@@ -50,8 +56,7 @@ end Grids;
 
 
 def test_components_in_rows_and_columns(tmp_path):
-    (tmp_path / "grids.mo").write_text(GRID)
-    library = load_modelica(tmp_path / "grids.mo")
+    library = loaded(tmp_path, GRID)
     result = simulate(library["Grids.Grid"](), stop=1.0)
     found = {n: result.final(n) for n in ("total", "column[2]", "last", "sizes[2]", "d[2,2].w[4]")}
     assert found == {"total": 12, "column[2]": 2, "last": 4, "sizes[2]": 3, "d[2,2].w[4]": 12}
@@ -112,8 +117,7 @@ end Media;
 
 
 def test_a_class_extends_the_one_of_its_name_and_has_the_constants_of_the_heir(tmp_path):
-    (tmp_path / "media.mo").write_text(EXTENDED)
-    library = load_modelica(tmp_path / "media.mo")
+    library = loaded(tmp_path, EXTENDED)
     for package, k, doubled in (("Middle", 2, 0), ("Last", 3, 1)):
         result = simulate(library[f"Media.{package}.Use"](), stop=1.0)
         assert result.final("v") == pytest.approx(3 * np.exp(-k), rel=1e-6)
@@ -217,8 +221,7 @@ end Instants;
 
 @pytest.fixture
 def instants(tmp_path):
-    (tmp_path / "instants.mo").write_text(INSTANTS)
-    return load_modelica(tmp_path / "instants.mo")
+    return loaded(tmp_path, INSTANTS)
 
 
 def test_an_integer_without_limits_is_held_and_elements_change(instants):
@@ -240,13 +243,8 @@ def test_subscripts_that_vary_are_assigned_and_loops_of_varying_length_end(insta
 
 def test_the_value_before_an_instant_at_the_place_of_now(instants):
     result = simulate(instants["Instants.Turns"](), stop=1.0)
-    assert [result.final(name) for name in ("count[1]", "count[2]", "count[3]", "k", "older")] == [
-        2,
-        2,
-        1,
-        3,
-        1,
-    ]
+    assert [result.final(f"count[{k}]") for k in (1, 2, 3)] == [2, 2, 1]
+    assert (result.final("k"), result.final("older")) == (3, 1)
 
 
 def test_the_later_of_two_whens_of_an_algorithm_wins(instants):
@@ -345,8 +343,7 @@ end Buses;
 
 
 def test_an_expandable_connector_has_what_is_connected_to_it(tmp_path):
-    (tmp_path / "buses.mo").write_text(BUSES)
-    library = load_modelica(tmp_path / "buses.mo")
+    library = loaded(tmp_path, BUSES)
     result = simulate(library["Buses.Whole"](), stop=1.0)
     assert [result.final(f"{name}.twice") for name in "abcd"] == [4, 6, 8, 12]
     assert result.final("unit.bus.speed") == 2
@@ -383,8 +380,7 @@ end Guessed;
 
 
 def test_a_guess_that_initial_equations_determine_is_left_to_them(tmp_path):
-    (tmp_path / "guessed.mo").write_text(GUESSED)
-    result = simulate(load_modelica(tmp_path / "guessed.mo")["Guessed.Whole"](), stop=1.0)
+    result = simulate(loaded(tmp_path, GUESSED)["Guessed.Whole"](), stop=1.0)
     assert result.at(0.0, "lag.y") == pytest.approx(4)
 
 
@@ -403,6 +399,5 @@ end Choices;
 
 
 def test_a_range_of_an_enumeration_holds_its_values(tmp_path):
-    (tmp_path / "choices.mo").write_text(CHOICES)
-    result = simulate(load_modelica(tmp_path / "choices.mo")["Choices.M"](), stop=1.0)
+    result = simulate(loaded(tmp_path, CHOICES)["Choices.M"](), stop=1.0)
     assert [result.final(n) for n in ("last[1]", "x[1]", "x[2]", "y[2]", "y[3]")] == [2, 0, 1, 2, 10]

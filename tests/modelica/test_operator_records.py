@@ -56,7 +56,8 @@ model M
   constant Pair j = Pair(0, 1);
   Pair z(re(start = 1, fixed = true), im(start = 0, fixed = true));
   Pair w = j * z, u, s = 2 * z + (-z), t = if time > 0.5 then z else Pair(0);
-  Pair many[2] = {z, j} + {Pair(1, 1), z};
+  Pair many[2] = {z, j} + {Pair(1, 1), z}, all = sum(many), power = product({z, z, z}), table[2, 2] = {many, many};
+  Pair twice = sum(table), count = sum(Pair(k, 1) for k in 1:3);
 equation
   der(z.re) = w.re;
   der(z.im) = w.im;
@@ -65,11 +66,15 @@ end M;
 """
 
 
+SUMS = ("all.re", "all.im", "power.re", "power.im", "twice.im", "count.re", "count.im")
+
+
 def test_operators_of_a_record_are_its_functions(tmp_path):
     (tmp_path / "pair.mo").write_text(TEXT)
     turn = simulate(load_modelica(tmp_path / "pair.mo")["M"](), stop=1.0)
     found = {
-        name: turn.final(name) for name in ("z.re", "z.im", "w.re", "u.re", "s.im", "t.re", "many[2].im")
+        name: turn.final(name)
+        for name in ("z.re", "z.im", "w.re", "u.re", "s.im", "t.re", "many[2].im", *SUMS)
     }
     c, s = np.cos(1), np.sin(1)  # z = exp(j t)
     assert found == pytest.approx(
@@ -81,6 +86,7 @@ def test_operators_of_a_record_are_its_functions(tmp_path):
             "s.im": s,
             "t.re": c,
             "many[2].im": 1 + s,
+            **dict(zip(SUMS, (1 + 2 * c, 2 + 2 * s, np.cos(3), np.sin(3), 4 + 4 * s, 6, 3), strict=True)),
         }
     )
 

@@ -130,6 +130,29 @@ MEANINGS = (  # where a wrong model would run: text, line and column, words
         "found 'k' declared differently in A and in B",
     ),
     (
+        "model A\n  type T = Real(start=3);\nend A;\nmodel B\n  type T = Real(start=4);\nend B;\nmodel M\n  extends A;\n"
+        "  extends B;\n  T x = 1;\nend M;",
+        "7:7",
+        "found 'T' declared differently in A and in B",
+    ),
+    (
+        "package P\n  type T = Real(start=3);\n  model A\n    T x;\n  end A;\nend P;\npackage Q\n  type T = Real(start=4);\n"
+        "  model A\n    T x;\n  end A;\nend Q;\nmodel M\n  extends P.A;\n  extends Q.A;\nend M;",
+        "13:7",
+        "found 'x' declared differently in P.A and in Q.A",
+    ),
+    (
+        "model M\n  Real x = mod(time, 0);\nend M;",
+        "2:12",
+        "found mod\\(..., 0\\), expected a divisor other than",
+    ),
+    ("model M\n  Real x[2] = rem({3, 4}, {time, 0});\nend M;", "2:15", "found rem\\(..., 0\\), expected"),
+    (
+        "model M\n  Real x = div(3, 0);\nend M;",
+        "2:12",
+        "found div\\(..., 0\\), expected a divisor other than",
+    ),
+    (
         "model A\nprotected\n  parameter Real p=1;\nend A;\nmodel M\n  A a(p=2);\nend M;",
         "6:7",
         "found 'p' modified, which is protected in A",

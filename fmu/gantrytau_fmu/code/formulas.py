@@ -17,6 +17,7 @@ from gantrytau import Dae
 from gantrytau.compiler.blocks.solution import SolvedBlocks
 from gantrytau.compiler.system import System
 from gantrytau.compiler.translated import carefully
+from gantrytau.flattening.flat_checks import refuse_events
 from gantrytau.language.piecewise import switched
 from gantrytau.language.symbols import split_derivative
 from gantrytau_fmu.code.arrays import column
@@ -95,6 +96,7 @@ class Formulas:
 
 def formulas_of(dae: Dae, outputs: Sequence[str]) -> Formulas:
     """The formulas of a translated model; outputs: scalar names of what can be read of it, states and all."""
+    refuse_events(dae.flat, "laws")
     found = written(dae)
     dae = found.dae
     careful = carefully(dae, SolvedBlocks(dae.blocks)).blocks

@@ -73,10 +73,7 @@ def _each(items: Any, reader: Any) -> Iterator[tuple[Any, Any]]:
     """The connections in loops and conditions that are known."""
     for item in items:
         if isinstance(item, tree.ForLoop):
-            readers = [reader]
-            for name, over in item.iterators:
-                readers = [one.with_local(**{name: k}) for one in readers for k in one.steps(over)]
-            for inner in readers:
+            for inner in reader.looped(item.iterators):
                 yield from _each(item.items, inner)
         elif isinstance(item, tree.Branching):
             tests, last = reader.open_branches(item.branches, item.otherwise or ())

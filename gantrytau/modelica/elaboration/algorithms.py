@@ -16,12 +16,12 @@ from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope
-from gantrytau.modelica.elaboration.statements import action_of, looped, pairs
+from gantrytau.modelica.elaboration.statements import action_of, pairs
 from gantrytau.modelica.elaboration.whens import when_chains
 from gantrytau.modelica.external.functions import check_known, external_value
-from gantrytau.modelica.records.assigned import chosen_value, most_rounds, unassigned, value_before, with_part
+from gantrytau.modelica.records.assigned import most_rounds, with_part
 from gantrytau.modelica.records.operators import function_for
-from gantrytau.modelica.records.record_values import RecordValue
+from gantrytau.modelica.records.record_values import RecordValue, mapped, scalars
 from gantrytau.modelica.references import Members, holding, references
 
 MOST_ROUNDS = 100_000  # of a `while`
@@ -88,7 +88,7 @@ class Execution:
                         f"found '{name}' assigned, expected a variable of the function{hint}",
                     )
                 self._refuse_given(target, reader)
-                wanted, whole = reader.members.type_of(target), isinstance(value, tuple)
+                wanted, whole = reader.members.structure.type_of(target), isinstance(value, tuple)
                 kind = type_of_value(one) or ("" if whole else type_of(item.value, reader))
                 if not fits(wanted, kind):
                     reader.scope.refuse(target.at, f"found {kind} for '{name}', expected {wanted}")
@@ -97,7 +97,9 @@ class Execution:
                         self._check_shape(name, one)
                     found = with_part(self.known[name], target.parts, one, reader)
                     for gone in self.left.values():
-                        found = found if gone is False else chosen_value(gone, self.known[name], found)
+                        found = (
+                            found if gone is False else values.chosen(gone, self.known[name], found, False)
+                        )
                     self.known[name] = found
                 except ModelError as error:
                     reader.scope.refuse(target.at, str(error))
@@ -119,7 +121,7 @@ class Execution:
         name = target.parts[0][0]
         prefixes = reader.scope.elements[name].clause.prefixes if name in reader.scope.elements else ()
         given = next((word for word in ("input", "parameter", "constant") if word in prefixes), "")
-        if given == "input" or (given and reader.members.is_fixed(target)):
+        if given == "input" or (given and reader.members.structure.is_fixed(target)):
             words = f"found the {given} '{name}' assigned, expected a variable; assign to one of another name"
             reader.scope.refuse(target.at, words)
 
@@ -135,7 +137,7 @@ class Execution:
         self.known[name] = value
         reader = replace(self.reader, scope=element.scope, local={**self.reader.local, **self.known})
         sizes = [*element.declaration.subscripts, *element.clause.subscripts]
-        wanted = reader.members.type_of(tree.ComponentReference(0, ((name, ()),)))
+        wanted = reader.members.structure.type_of(tree.ComponentReference(0, ((name, ()),)))
         if not fits(wanted, kind := type_of_value(value)):
             raise ModelError(f"found {kind} for '{name}' of {self.reader.scope.name}, expected {wanted}")
         if not any(isinstance(one, tree.Mark) for one in sizes) and not is_array_type(element):
@@ -145,7 +147,7 @@ class Execution:
 
     def _repeat(self, item: tree.ForLoop, reader: Interpreter, local: Mapping[str, Any]) -> None:
         outer = self.left["break"]
-        for inner in looped(item, reader):
+        for inner in reader.looped(item.iterators):
             steps = {name: inner.local[name] for name, _ in item.iterators}
             try:
                 self.run(item.items, {**local, **steps})
@@ -195,8 +197,10 @@ class Execution:
         for test, items in reversed(tests):
             other, left = self.known, self.left
             self._carry_out(items, local, before, gone)
-            self.known = {name: chosen_value(test, one, other[name]) for name, one in self.known.items()}
-            self.left = {word: chosen_value(test, one, left[word]) for word, one in self.left.items()}
+            self.known = {
+                name: values.chosen(test, one, other[name], False) for name, one in self.known.items()
+            }
+            self.left = {word: values.chosen(test, one, left[word], False) for word, one in self.left.items()}
         for word in (word for word, one in self.left.items() if one is True):
             self.left = gone
             raise LeftBlock(word)
@@ -223,10 +227,10 @@ def stated_by_algorithm(
     whens = [one for one in items if isinstance(one, tree.Branching) and one.word == "when"]
     held = dict.fromkeys(name for one in whens for _, inner in one.branches for name in targets(inner))
     names = [n for n in dict.fromkeys(targets(items)) if n not in held]
-    run = Execution(reader, {n: unassigned(reader.members.member(n)) for n in names})
-    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.shape(n))}
+    run = Execution(reader, {n: mapped(lambda _: None, reader.members.member(n)) for n in names})
+    run.shapes |= {n: shape for n in (*names, *held) if (shape := reader.members.structure.shape(n))}
     run.known |= {n: reader.members.member(n) for n in held}
-    old = {n: value_before(one) for n, one in run.known.items() if n in held}
+    old = {n: mapped(values.FUNCTIONS["pre"], one) for n, one in run.known.items() if n in held}
     for item in items:
         if item in whens:
             before = replace(run, known={**run.known, **old})
@@ -240,7 +244,7 @@ def stated_by_algorithm(
     for name in names:
         if wanted is not None and name not in wanted:
             continue
-        if _is_open(run.known[name]):
+        if any(one is None for one in scalars(run.known[name])):
             raise ModelError(
                 f"found '{name}' without a value behind an algorithm, expected one in each branch"
             )
@@ -296,7 +300,7 @@ def called_class(
     except LeftBlock:
         pass
     outputs = [n for n, e in scope.elements.items() if "output" in e.clause.prefixes]
-    missing = next((n for n in outputs if _is_open(run.known[n])), None)
+    missing = next((n for n in outputs if any(one is None for one in scalars(run.known[n]))), None)
     if missing is not None:
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
@@ -328,12 +332,6 @@ def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution
     found = external_value(name, given, scope.root.inherited_class)
     several = dict(zip(written, found, strict=True)) if len(written) > 1 else {}
     return tuple(several[n] for n in outputs) if several else found
-
-
-def _is_open(value: Any) -> bool:
-    if isinstance(value, (list, RecordValue)):
-        return any(map(_is_open, value.values() if isinstance(value, RecordValue) else value))
-    return value is None or (isinstance(value, np.ndarray) and any(one is None for one in value.flat))
 
 
 def _given(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, Self, cast
 
 import casadi as ca
 import numpy as np
@@ -16,8 +16,7 @@ from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue
 from gantrytau.modelica.overdetermined.spanning import answered, is_operator
-from gantrytau.modelica.records.operators import operated
-from gantrytau.modelica.records.record_values import RecordValue
+from gantrytau.modelica.records.operators import called, operated
 from gantrytau.modelica.references import (
     Members,
     called_function,
@@ -57,14 +56,6 @@ def changed(new: Any, old: Any) -> Any:
     return logic_or(new > old + 0.5, new < old - 0.5)
 
 
-def _elements(components: Any, places: Sequence[int | list[int]]) -> Any:
-    """The components of a list, or of lists in it, at the places of each dimension."""
-    place, *rest = places
-    many = [place] if isinstance(place, int) else place
-    found = [_elements(components[k], rest) if rest else components[k] for k in many]
-    return found[0] if isinstance(place, int) else found
-
-
 def first_result(value: Any) -> Any:
     """The first of several results of a function, which is its value in an expression."""
     return next(iter(value), None) if isinstance(value, tuple) else value
@@ -88,7 +79,7 @@ class Interpreter:
     settled: bool = False
     following: frozenset[str] | None = None
 
-    def with_local(self, **values: Any) -> "Interpreter":
+    def with_local(self, **values: Any) -> Self:
         """The same with further iterators."""
         return replace(self, local={**self.local, **values})
 
@@ -109,9 +100,6 @@ class Interpreter:
         except FAULTS as error:
             self.scope.refuse(expression.at, f"found what has no value: {in_words(error)}")
 
-    def _stated(self, e: tree.Number | tree.BooleanLiteral) -> Any:
-        return e.value
-
     def _literal(self, e: tree.StringLiteral) -> str:
         plain = "\\" not in e.text
         return e.text if plain else e.text.encode("latin-1", "backslashreplace").decode("unicode_escape")
@@ -120,9 +108,6 @@ class Interpreter:
         if e.word != "end" or self.end is None:
             raise ModelError(f"found '{e.word}', expected a value")
         return self.end
-
-    def _unary(self, e: tree.Unary) -> Any:
-        return operated(e.operator, [self.value(e.operand)], self.library.call)
 
     def _binary(self, e: tree.Binary) -> Any:
         above = from_left(e)
@@ -173,6 +158,13 @@ class Interpreter:
             inner = self.with_local(**{name: one})
             yield values.array(list(inner._iterated(item, others))) if others else inner.value(item)
 
+    def looped(self, iterators: Sequence[tree.Iterator]) -> "list[Self]":
+        """What reads the body of a loop, once for each value of its iterators."""
+        found = [self]
+        for name, over in iterators:
+            found = [inner.with_local(**{name: one}) for inner in found for one in inner.steps(over)]
+        return found
+
     def steps(self, over: tree.Expression | None) -> Sequence[Any]:
         """The values of an iterator."""
         if over is None:
@@ -188,9 +180,6 @@ class Interpreter:
         rows = [[np.atleast_1d(values.boxed(self.value(one))) for one in row] for row in e.rows]
         rows = [[one[:, None] if one.ndim == 1 else one for one in row] for row in rows]
         return np.concatenate([np.concatenate(row, axis=1) for row in rows], axis=0).astype(object)
-
-    def _subscripted(self, e: tree.Subscripted) -> Any:
-        return self.indexed(self.value(e.array), e.subscripts)
 
     def _outputs(self, e: tree.OutputList) -> Any:
         raise ModelError("found a list of outputs, expected one value; it stands left of '=' and ':=' only")
@@ -255,33 +244,24 @@ class Interpreter:
         return self.library.package(owner).member(name), subscripts, rest
 
     def part(self, value: Any, name: str) -> Any:
-        """A member of a component or record, or of each in a list."""
-        if isinstance(value, list):
+        """A member of a component or record, or of each in an array."""
+        if isinstance(value, np.ndarray):
             return values.array([self.part(one, name) for one in value])
-        if isinstance(value, RecordValue):
-            known: Sequence[str] = [*value]
-            if name in value:
-                return value[name]
-        elif hasattr(value, "member"):
-            known = value.names()
-            if value.has(name):
-                return value.member(name)
-        else:
-            known = ()
+        if hasattr(value, "member") and value.has(name):
+            return value.member(name)
+        known = getattr(value, "names", tuple)()
         raise ModelError(f"found '{name}' behind a dot, expected a member{did_you_mean(name, known)}")
 
     def indexed(self, value: Any, subscripts: Sequence[tree.Expression]) -> Any:
-        """The elements of an array or list that subscripts choose."""
+        """The elements of an array that subscripts choose."""
         if not subscripts:
             return value
         shape = values.all_sizes(value)
         if len(subscripts) > len(shape):
             raise ModelError(f"found {len(subscripts)} subscripts, expected at most {len(shape)}")
-        if isinstance(value, np.ndarray) and value.size and any(map(self.varies, subscripts, shape)):
+        if value.size and values.is_plain(value) and any(map(self.varies, subscripts, shape)):
             return self._chosen(value, subscripts)
         places = [self.places(one, size) for one, size in zip(subscripts, shape, strict=False)]
-        if isinstance(value, list):
-            return _elements(value, places)
         for axis in reversed(range(len(places))):
             value = np.take(value, places[axis], axis=axis)
         return value
@@ -332,7 +312,7 @@ class Interpreter:
         inner = replace(self, quiet=True) if quiet else self
         if e.iterators:
             found = values.array(list(inner._iterated(e.arguments[0], e.iterators)))
-            return found if name == "array" else values.called(name, [np.ravel(found)], {})
+            return found if name == "array" else called(name, [np.ravel(found)], {}, self.library.call)
         if name == "size" and e.arguments and (shape := declared_shape(e.arguments[0], self)) is not None:
             return values.called(name, [np.empty(shape), *map(self.value, e.arguments[1:])], {})
         if name in ("size", "ndims") and e.arguments:
@@ -341,7 +321,7 @@ class Interpreter:
             instant = self.members.next_sample(e)
             return time >= instant if name == "sample" else instant > 0.5
         if name == "getInstanceName":
-            return self.members.instance_name
+            return self.members.structure.instance_name
         before = name in ("pre", "edge", "change") and len(e.arguments) == 1
         if name == "pre" and before and (at := subscripts_at_end(e.arguments[0])):
             whole = self.value(replace(e, arguments=at[:1]))
@@ -359,7 +339,7 @@ class Interpreter:
             raise ModelError(
                 f"found the variable '{name}' with a time, expected that in costs and constraints of an optimization only"
             )
-        return arguments[0] if name == "pure" else values.called(name, arguments, named)
+        return arguments[0] if name == "pure" else called(name, arguments, named, self.library.call)
 
     def _before(self, asked: str, e: tree.Expression) -> Any:
         """`pre`, `edge` or `change` of what is settled, or is followed by a Discrete; None for all else."""
@@ -382,17 +362,17 @@ class Interpreter:
 
 
 _EVALUATE: Mapping[type, Callable[[Interpreter, Any], Any]] = {
-    tree.Number: Interpreter._stated,
+    tree.Number: lambda reader, e: e.value,
     tree.StringLiteral: Interpreter._literal,
-    tree.BooleanLiteral: Interpreter._stated,
+    tree.BooleanLiteral: lambda reader, e: e.value,
     tree.Mark: Interpreter._mark,
-    tree.Unary: Interpreter._unary,
+    tree.Unary: lambda reader, e: operated(e.operator, [reader.value(e.operand)], reader.library.call),
     tree.Binary: Interpreter._binary,
     tree.RangeExpression: Interpreter._range,
     tree.Conditional: Interpreter._conditional,
     tree.ArrayConstructor: Interpreter._array,
     tree.Matrix: Interpreter._matrix,
-    tree.Subscripted: Interpreter._subscripted,
+    tree.Subscripted: lambda reader, e: reader.indexed(reader.value(e.array), e.subscripts),
     tree.OutputList: Interpreter._outputs,
     tree.ComponentReference: Interpreter._reference,
     tree.Call: Interpreter._call,

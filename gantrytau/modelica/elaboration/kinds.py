@@ -1,7 +1,6 @@
 """Types of values and of expressions (Modelica 3.6, chapters 3.6 and 6.7), as far as the text tells them."""
 
-from collections.abc import Iterable, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -43,18 +42,17 @@ def type_of(e: Any, reader: Interpreter) -> str:
     if isinstance(e, tree.Call):
         return "" if e.iterators else _type_of_call(e, reader)
     if isinstance(e, tree.Unary):
-        (found,) = _operands(
-            (e.operand,), ("Boolean",) if e.operator == "not" else NUMBERS, e.operator, reader
-        )
+        taken = ("Boolean",) if e.operator == "not" else NUMBERS
+        (found,) = _operands(_typed([e.operand], reader), taken, e.operator, reader)
         return "Boolean" if e.operator == "not" else found
     if isinstance(e, tree.Binary):
         return _type_of_binary(e, reader)
     if isinstance(e, tree.Conditional):
         tests, branches = zip(*e.branches, strict=True)
-        _operands(tests, ("Boolean",), "if", reader)
-        return _joined((*branches, e.otherwise), reader)
+        _operands(_typed(tests, reader), ("Boolean",), "if", reader)
+        return _joined(_typed((*branches, e.otherwise), reader), reader)
     if isinstance(e, tree.ArrayConstructor):
-        return "" if e.iterators else _joined(e.items, reader)
+        return "" if e.iterators else _joined(_typed(e.items, reader), reader)
     if isinstance(e, (tree.Number, tree.StringLiteral, tree.BooleanLiteral)):
         found = reader.value(e)
         return "Real" if isinstance(found, float) else type_of_value(found)
@@ -63,6 +61,13 @@ def type_of(e: Any, reader: Interpreter) -> str:
 
 NUMBERS = ("Real", "Integer")
 NOT_ENUMERATED = ("Real", "Boolean", "String")
+
+
+Typed = Iterable[tuple[Any, str]]  # expressions with their types
+
+
+def _typed(items: Iterable[Any], reader: Interpreter) -> list[tuple[Any, str]]:
+    return [(one, type_of(one, reader)) for one in items]
 
 
 def _type_of_binary(e: tree.Binary, reader: Interpreter) -> str:
@@ -75,41 +80,31 @@ def _type_of_binary(e: tree.Binary, reader: Interpreter) -> str:
 
 def _type_of_sides(e: tree.Binary, left: str, reader: Interpreter) -> str:
     """The type of an operator's value, that of whose left side is known."""
-    sign, sides, known = e.operator, (e.left, e.right), {id(e.left): left}
+    sign, sides = e.operator, ((e.left, left), (e.right, type_of(e.right, reader)))
     if sign in ("and", "or"):
-        _operands(sides, ("Boolean",), sign, reader, known)
+        _operands(sides, ("Boolean",), sign, reader)
         return "Boolean"
     if sign in RELATIONS:
-        _joined(sides, reader, known)
+        _joined(sides, reader)
         return "Boolean"
-    found = _operands(sides, (*NUMBERS, "String") if sign == "+" else NUMBERS, sign, reader, known)
+    found = _operands(sides, (*NUMBERS, "String") if sign == "+" else NUMBERS, sign, reader)
     if "" in found:
         return ""
     return "Real" if sign in ("/", "./", "^", ".^") or "Real" in found else found[0]
 
 
-def _operands(
-    items: Iterable[Any],
-    taken: tuple[str, ...],
-    sign: str,
-    reader: Interpreter,
-    known: Mapping[int, str] = MappingProxyType({}),
-) -> list[str]:
-    """The types of operands, by their ids where they are known; TextError for one that the operator does not take."""
-    found = [(one, known[id(one)] if id(one) in known else type_of(one, reader)) for one in items]
-    for one, kind in found:
+def _operands(items: Typed, taken: tuple[str, ...], sign: str, reader: Interpreter) -> list[str]:
+    """The types of operands; TextError for one that the operator does not take."""
+    for one, kind in items:
         if kind and kind not in taken:
             reader.scope.refuse(one.at, f"found {kind} beside '{sign}', expected {' or '.join(taken)}")
-    return [kind for _, kind in found]
+    return [kind for _, kind in items]
 
 
-def _joined(
-    items: Iterable[Any], reader: Interpreter, known: Mapping[int, str] = MappingProxyType({})
-) -> str:
-    """The one type of several expressions, by their ids where known; TextError for two that do not go together."""
+def _joined(items: Typed, reader: Interpreter) -> str:
+    """The one type of several expressions; TextError for two that do not go together."""
     found = ""
-    for one in items:
-        kind = known[id(one)] if id(one) in known else type_of(one, reader)
+    for one, kind in items:
         if not (fits(found, kind) or fits(kind, found)):
             reader.scope.refuse(one.at, f"found {kind} beside {found}, expected one type")
         found = "Real" if "Real" in (found, kind) else kind or found
@@ -119,7 +114,7 @@ def _joined(
 def _type_of_reference(e: tree.ComponentReference, reader: Interpreter) -> str:
     name = e.parts[0][0]
     if reader.members.has(name):
-        return reader.members.type_of(e)
+        return reader.members.structure.type_of(e)
     if name in reader.local:
         return type_of_value(reader.local[name])
     return "Real" if name == "time" else type_of_value(reader.value(e))

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
@@ -30,13 +30,17 @@ partial class OptimizationHorizon
   parameter Real finalTime(unit="s") = 1 "when it ends";
 end OptimizationHorizon;
 """
-FORMER = {  # names of the Modelica Standard Library before version 4
-    "Modelica.SIunits": "Modelica.Units.SI",
-    "Modelica.Units.SI.Conversions": "Modelica.Units.Conversions",
-    "Modelica.Units.Conversions.NonSIunits": "Modelica.Units.NonSI",
-    "Modelica.Units.SI.Temp_K": "Modelica.Units.SI.Temperature",
-    "Modelica.Units.SI.Temp_C": "Modelica.Units.NonSI.Temperature_degC",
-}
+FORMER = """
+package SIunits "what version 3 of the Modelica Standard Library has under this name"
+  extends Modelica.Units.SI;
+  package Conversions
+    extends Modelica.Units.Conversions;
+    package NonSIunits = Modelica.Units.NonSI;
+  end Conversions;
+  type Temp_K = Modelica.Units.SI.Temperature;
+  type Temp_C = Modelica.Units.NonSI.Temperature_degC;
+end SIunits;
+"""
 
 
 class ModelicaLibrary:
@@ -92,6 +96,9 @@ class ModelicaLibrary:
             _read_all(one)
             left += [inner for inner in one.classes.values() if inner.around is one]
         return tuple(sorted({one.name for one in left if one.definition.kind in self.kinds}))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
 
     def _found(self, name: str) -> ClassScope:
         return self.root.classes.get(name) or self.root.find_class(name, 0)
@@ -244,9 +251,17 @@ def package_in(folder: Path, around: ClassScope) -> ClassScope:
         )
     made = ClassScope(definition, found.source, around)
     made.more = lambda name: (
-        _in_folder(folder, name, made) or _renamed(made, name) or _absent(folder, name, made)
+        _in_folder(folder, name, made) or _former(name, made) or _absent(folder, name, made)
     )
     return made
+
+
+def _former(name: str, package: ClassScope) -> ClassScope | None:
+    """A package that the library has no longer, by the names of today."""
+    if (package.name, name) != ("Modelica", "SIunits"):
+        return None
+    found = parse(SourceText("Modelica", FORMER))
+    return ClassScope(found.classes[0], found.source, package)
 
 
 def _absent(folder: Path, name: str, package: ClassScope) -> None:
@@ -323,25 +338,3 @@ def version_of(definition: tree.ClassDefinition, used: str = "") -> str:
 def _numbers(version: str) -> tuple[int, ...]:
     """A version as numbers, of which one without zeros at its end is the same."""
     return tuple(map(int, re.findall(r"\d+", re.sub(r"(\.0)*([-+ ].*)?$", "", version))))
-
-
-def _renamed(package: ClassScope, name: str) -> ClassScope | None:
-    """The class of today that a former name in a package means; None where there is none."""
-    if package.name != "Modelica" or f"Modelica.{name}" not in FORMER:
-        return None
-    found = _today(package, f"Modelica.{name}")
-    for former in FORMER:
-        around, _, last = former.rpartition(".")
-        if around == found.name and found.own_class(last) is None:
-            found.classes[last] = _today(package, former)
-    return found
-
-
-def _today(package: ClassScope, former: str) -> ClassScope:
-    _, *path = FORMER[former].split(".")
-    found: ClassScope | None = package
-    for part in path:
-        found = found.inherited_class(part) if found else None
-    if found is None:
-        raise KeyError(FORMER[former])
-    return found

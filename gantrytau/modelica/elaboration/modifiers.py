@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from gantrytau.modelica import tree
-from gantrytau.modelica.records.record_values import RecordValue
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +73,14 @@ class Modifier:
         """The part of its value that indices and names of members choose."""
         for step in self.path:
             if isinstance(step, str):
-                known = value if isinstance(value, RecordValue) else getattr(value, "names", tuple)()
-                if step not in known:
+                if step not in getattr(value, "names", tuple)():
                     words = f"found a value without '{step}' for a record, expected one of its type, with all members"
                     self.scope.refuse(self.at, words)
-                value = value[step] if isinstance(value, RecordValue) else value.member(step)
+                value = value.member(step)
                 continue
             index, count = step
-            if not isinstance(value, (list, np.ndarray)) or len(value) != count:
-                found = f"{len(value)} values" if isinstance(value, (list, np.ndarray)) else "a scalar"
+            if not isinstance(value, np.ndarray) or len(value) != count:
+                found = f"{len(value)} values" if isinstance(value, np.ndarray) else "a scalar"
                 self.scope.refuse(
                     self.at,
                     f"found {found} for an array of {count} components, expected one value for each; 'each' before the name "

@@ -1,7 +1,6 @@
 """Instances with symbols, and values of Modelica text that are computed in them."""
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,78 +19,51 @@ from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.statements import AbsentComponent, stated
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.printer import expression_written
-from gantrytau.modelica.references import connects_in
+from gantrytau.modelica.references import Members, connects_in
 
 
-class PlacedMembers:
+class PlacedMembers(Members):
     """An instance with symbols, whose members an expression asks for by their names."""
 
     def __init__(self, instance: Any, structure: Structure | None = None):
-        self.instance = instance
-        self.structure = getattr(type(instance), "structure", structure)
-
-    def has(self, name: str) -> bool:
-        return name in self.names()
+        found = getattr(type(instance), "structure", structure)
+        if found is None:
+            raise ModelError(
+                f"found {type(instance).__name__}, a class of Python, expected one of Modelica text"
+            )
+        self.instance, self.structure = instance, found
 
     @property
     def scope(self) -> ClassScope:
         """Its class."""
-        if self.structure is None:
-            raise ModelError(
-                f"found a function of {type(self.instance).__name__}, expected one of Modelica text"
-            )
         return self.structure.scope
 
     @property
     def around(self) -> "PlacedMembers | None":
-        """The instance of which it is a component."""
+        """The instance of Modelica text of which it is a component."""
         found = around(self.instance)
-        return found and PlacedMembers(found)
-
-    @property
-    def instance_name(self) -> str:
-        return self.structure.instance_name if self.structure else type(self.instance).__name__
-
-    def names(self) -> Sequence[str]:
-        return self.structure.names() if self.structure else [*type(self.instance).members()]
+        return PlacedMembers(found) if hasattr(type(found), "structure") else None
 
     def member(self, name: str) -> Any:
-        """The value of a component."""
-        one = self.structure.members[name] if self.structure else None
-        if one is not None and not one.present:
+        one = self.structure.members[name]
+        if not one.present:
             raise AbsentComponent(f"{name}, whose condition does not hold")
-        if one is not None and (one.is_folded or one.is_object):
-            return self.structure.member(name) if self.structure else None
-        if one is not None and 0 in one.shape:
-            return np.empty(one.shape, dtype=object) if one.primitive else []
-        found = getattr(
-            self.instance,
-            outer_name(name) if one is not None and {"inner", "outer"} <= one.prefixes else name,
-        )
+        if one.is_folded or one.is_object:
+            return self.structure.member(name)
+        if 0 in one.shape:
+            return np.empty(one.shape, dtype=object)
+        found = getattr(self.instance, outer_name(name) if {"inner", "outer"} <= one.prefixes else name)
         if isinstance(found, ca.SX):
-            return values.from_casadi(found, one.shape) if one is not None else _by_size(found)
+            return values.from_casadi(found, one.shape)
         if isinstance(found, tuple):
-            each = [PlacedMembers(each) for each in found]
-            return each if one is None else values.in_rows(each, one.shape)
+            return values.in_rows([PlacedMembers(each) for each in found], one.shape)
         return PlacedMembers(found) if isinstance(found, Declared) else found
-
-    def shape(self, name: str) -> tuple[int, ...] | None:
-        return self.structure.shape(name) if self.structure else None
-
-    def type_of(self, reference: tree.ComponentReference) -> str:
-        return "" if self.structure is None else self.structure.type_of(reference)
-
-    def values_of(self, reference: tree.ComponentReference) -> range | None:
-        return None if self.structure is None else self.structure.values_of(reference)
-
-    def is_fixed(self, expression: tree.Expression) -> bool:
-        return self.structure is not None and self.structure.is_fixed(expression)
 
     def before(self, name: str, asked: str) -> Any:
         own = asked == "pre" and isinstance(type(self.instance).members().get(name), Discrete)
         found = None if own else self._following(BEHIND, name)
         parts = tuple((part, ()) for part in name.split("."))
-        one = self.structure.leaf(tree.ComponentReference(0, parts)) if self.structure else None
+        one = self.structure.leaf(tree.ComponentReference(0, parts))
         return found if found is None or one is None else values.from_casadi(found, one.shape)
 
     def turn(self, name: str) -> Any:
@@ -103,9 +75,7 @@ class PlacedMembers:
 
     def next_sample(self, call: tree.Call) -> Any:
         name = sample_name(call)
-        if not hasattr(self.instance, name):
-            raise ModelError(f"found {call.function.parts[0][0]}() in a value, expected it among equations")
-        return getattr(self.instance, name)
+        return getattr(self.instance, name) if hasattr(self.instance, name) else super().next_sample(call)
 
     def cardinality(self) -> int:
         """The number of connections of a connector, on both sides of the component that has it."""
@@ -137,11 +107,6 @@ def _connected(component: Any) -> Counter[int]:
             found = [one for items, reader in readers for one in stated(items, reader)]
         component._connected = Counter(id(end) for one in found for end in (one.a, one.b))
     return component._connected
-
-
-def _by_size(found: ca.SX) -> Any:
-    shape = () if found.numel() == 1 else found.shape if found.shape[1] > 1 else (found.shape[0],)
-    return values.from_casadi(found, shape)
 
 
 class Bound(Formula):

@@ -126,14 +126,14 @@ def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[
             if not isinstance(text, str):
                 attribute.scope.refuse(attribute.at, f"found {text!r} as {name}, expected a text")
         elif name in ("fixed", "free"):
-            value = structure.folded(attribute.seen_from(structure))
-            each = set(np.ravel(value))
-            if len(each) > 1:
-                words = f"found some elements of '{one.name}' fixed, expected all or none; write an initial equation"
+            value = np.array(structure.folded(attribute.seen_from(structure)), dtype=bool)
+            alike = value.all() or not value.any()
+            if not alike and (one.is_parameter or name == "free"):
+                words = f"found '{name}' of some elements of '{one.name}', expected all or none; declare two arrays"
                 attribute.scope.refuse(attribute.at, words)
             # of Booleans and Integers it says pre(b) = start, not b = start (chapter 8.6)
             if one.is_parameter or one.kind == "Real" or name == "free":
-                found[name] = bool(each.pop())
+                found[name] = bool(value.any()) if alike else value
         elif name == "stateSelect":
             found["prefer"] = StateSelect(int(structure.folded(attribute.seen_from(structure))) - 1)
         else:
@@ -198,7 +198,13 @@ def keywords_of(child: Structure, said: Modifier, structure: Structure) -> dict[
 def is_free(one: ClassMember) -> bool:
     """Whether a text leaves a quantity to the optimiser."""
     said = one.full.inner.get("free")
-    return said is not None and said.value is not None and _said(one, said)
+    if said is None or said.value is None:
+        return False
+    found = {bool(value) for value in np.ravel(one.owner.folded(said))}
+    if len(found) > 1:
+        words = f"found some elements of '{one.name}' free, expected all or none; declare two arrays"
+        said.scope.refuse(said.at, words)
+    return found.pop()
 
 
 def refuse_free(one: ClassMember) -> None:
@@ -217,14 +223,6 @@ def inside_optimization(structure: Structure) -> bool:
     while root.around is not None:
         root = root.around
     return root is not structure and root.scope.definition.kind == "optimization"
-
-
-def _said(one: ClassMember, said: Modifier) -> bool:
-    found = {bool(value) for value in np.ravel(one.owner.folded(said))}
-    if len(found) > 1:
-        words = f"found some elements of '{one.name}' set, expected all or none; declare two arrays"
-        said.scope.refuse(said.at, words)
-    return found.pop()
 
 
 def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifier:
@@ -251,9 +249,9 @@ def without_optimica(one: ClassMember, said: Modifier, declared: bool) -> Modifi
 
 
 def is_fixed(one: ClassMember) -> bool:
-    """Whether the start value of a variable holds."""
+    """Whether the start value of a variable holds, of an array that of some elements at least."""
     said = one.full.inner.get("fixed")
-    return said is not None and said.value is not None and _said(one, said)
+    return said is not None and said.value is not None and bool(np.any(one.owner.folded(said)))
 
 
 def _as_value(one: ClassMember, guess: Modifier) -> Modifier:

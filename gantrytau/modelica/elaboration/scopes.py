@@ -7,7 +7,7 @@ from typing import NoReturn, cast
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import with_pulses
+from gantrytau.modelica.conditions import bound_pulses, is_call, with_pulses
 from gantrytau.modelica.elaboration import modifiers
 from gantrytau.modelica.elaboration.modifiers import (
     Element,
@@ -86,11 +86,8 @@ class ClassScope:
     @cached_property
     def classes(self) -> dict[str, "ClassScope"]:
         """The classes that stand in it."""
-        found = {
-            i.name: ClassScope(i, self.source, self)
-            for i in self.items
-            if isinstance(i, tree.ClassDefinition)
-        }
+        own = (i for i in self.items if isinstance(i, tree.ClassDefinition))
+        found = {i.name: ClassScope(i, self.source, self) for i in own}
         new = self.replaced
         return found | {name: replace(new[name], limit=old) for name, old in found.items() if name in new}
 
@@ -104,6 +101,9 @@ class ClassScope:
                 if one.name in found:
                     self.refuse(one.at, f"found a second component '{one.name}' of {self.name}, expected one")
                 said = read_modification(one.modification, self, final="final" in clause.prefixes)
+                said = (
+                    replace(said, value=None) if is_call(said.value, "sample") else said
+                )  # a section has it
                 found[one.name] = Element(clause, one, self, said, protected)
         return found
 
@@ -155,12 +155,9 @@ class ClassScope:
         base = start.find_class(name, at, inherited=False)
         limits = (self, self.limit) if isinstance(self.definition.body, tree.ShortClass) else ()
         modifier = merged(read_arguments(arguments, start), modifiers.read_constraint(*limits))
-        anew = (
-            x
-            for x in self.classes.items()
-            if "redeclare" in x[1].definition.prefixes or x[1].extends_its_name
-        )
-        found = base.redeclared(modifier).with_replaced({**dict(anew), **self.replaced})
+        own = self.classes.items()
+        anew = {n: x for n, x in own if "redeclare" in x.definition.prefixes or x.extends_its_name}
+        found = base.redeclared(modifier).with_replaced({**anew, **self.replaced})
         if base.definition.kind == "package" and (modifier.inner or self.declared or self.heir):
             found = replace(found, heir=self.heir or self)
         return found, modifier
@@ -238,13 +235,15 @@ class ClassScope:
 
     def _check_same(self, one: Element, other: Element) -> None:
         """TextError for two declarations of one name that say different things."""
-        if one.stated != other.stated or not one.modifier.says_the_same(other.modifier):
-            places = " and in ".join(x.scope.name for x in (one, other))
-            self.refuse(
-                other.declaration.at if other.scope is self else self.definition.at,
-                f"found '{one.declaration.name}' declared differently in {places}, expected one declaration; rename one, or "
-                "modify it where it is inherited",
-            )
+        said = one.stated == other.stated and one.modifier.says_the_same(other.modifier)
+        kinds = [x.scope.find_class(x.clause.type, x.clause.at) for x in (one, other)] if said else []
+        if not said or kinds[0].definition != kinds[1].definition:
+            at = other.declaration.at if other.scope is self else self.definition.at
+            self._refuse_different(one.declaration.name, one.scope, other.scope, at)
+
+    def _refuse_different(self, name: str, one: "ClassScope", other: "ClassScope", at: int) -> NoReturn:
+        words = f"found '{name}' declared differently in {one.name} and in {other.name}"
+        self.refuse(at, f"{words}, expected one declaration; rename one, or modify it where it is inherited")
 
     def _check_names(self, base: "ClassScope", modifier: Modifier) -> None:
         for name, one in modifier.inner.items():
@@ -274,6 +273,8 @@ class ClassScope:
             if one.kind not in ELEMENT_SECTIONS:
                 items = tuple(with_pulses(i for i in one.items if not isinstance(i, tree.Element)))
                 found.append(StatementSection(one.kind, items, self))
+        if pulses := tuple(bound_pulses(self.declared)):
+            found.append(StatementSection("equation", pulses, self))
         return tuple(found)
 
     def names(self) -> list[str]:
@@ -293,8 +294,13 @@ class ClassScope:
 
     def inherited_class(self, name: str) -> "ClassScope | None":
         """The class of that name in it or in what it extends."""
-        found = self.own_class(name)
-        return found or next((x for base, _ in self.bases if (x := base.inherited_class(name))), None)
+        if (found := self.own_class(name)) is not None:
+            return found
+        inherited = [x for base, _ in self.bases if (x := base.inherited_class(name)) is not None]
+        other = next((x for x in inherited if x.definition != inherited[0].definition), None)
+        if other is not None and inherited[0].around and other.around:
+            self._refuse_different(name, inherited[0].around, other.around, self.definition.at)
+        return next(iter(inherited), None)
 
     @cached_property
     def _imports(self) -> list[tree.Import]:
@@ -391,9 +397,4 @@ class ClassScope:
 
     def known_names(self) -> list[str]:
         """Names of classes that can be said here, for messages."""
-        here: ClassScope | None = self
-        found: list[str] = []
-        while here is not None:
-            found += [*here.classes]
-            here = here.around
-        return [*dict.fromkeys(found)]
+        return [*dict.fromkeys((*self.classes, *(self.around.known_names() if self.around else ())))]

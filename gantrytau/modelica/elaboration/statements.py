@@ -55,7 +55,7 @@ def _stated_one(item: tree.EquationOrStatement, reader: Interpreter) -> Iterator
     elif isinstance(item, tree.ConnectEquation):
         yield from _connections(item, reader)
     elif isinstance(item, tree.ForLoop):
-        for inner in looped(item, reader):
+        for inner in reader.looped(item.iterators):
             yield from stated(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "when":
         yield from when_chains(item, reader, _actions)
@@ -82,7 +82,7 @@ def _check_types(item: tree.SimpleEquation, reader: Interpreter, assigned: bool 
 def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenChain]:
     """What makes a Boolean or Integer follow an expression that asks for values before."""
     left = cast(tree.ComponentReference, item.left)
-    taken, turn = reader.members.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
+    taken, turn = reader.members.structure.values_of(left), reader.members.turn(own_turn(left.parts[0][0]))
     now = sides(item, replace(reader, settled=True))
     waits = not remembers(item, reader.members)  # else a pulse of one round would have passed
     for (variable, right), (_, settled) in zip(sides(item, reader), now, strict=True):
@@ -90,7 +90,7 @@ def _following(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[WhenC
             chain = follows(settled, variable, turn, right)
             yield WhenChain(tuple(replace(one, waits=waits) for one in chain.branches))
             continue
-        if reader.members.type_of(left) == "Boolean":
+        if reader.members.structure.type_of(left) == "Boolean":
             test = values.condition(right)
             tests = [logic_not(test), test]
         else:
@@ -107,7 +107,9 @@ def remembers(item: tree.EquationOrStatement, members: Members) -> TypeGuard[tre
     asked = [one.arguments[0] for one in calls if one.function.parts[0][0] == "pre"]
     inside = {id(one) for one in asked}
     others = [one for one in nodes_of(item.right) if id(one) not in inside and one in asked]
-    return members.type_of(item.left) in ("Boolean", "Integer") and bool(others or item.left in asked)
+    return members.structure.type_of(item.left) in ("Boolean", "Integer") and bool(
+        others or item.left in asked
+    )
 
 
 def _asks_before(item: tree.EquationOrStatement) -> TypeGuard[tree.SimpleEquation]:
@@ -120,14 +122,6 @@ def _is_discrete(item: Any, reader: Interpreter) -> TypeGuard[tree.SimpleEquatio
     left = item.left if isinstance(item, tree.SimpleEquation) else None
     members = type(cast(Any, reader.members).instance).members()
     return isinstance(left, tree.ComponentReference) and isinstance(members.get(left.parts[0][0]), Discrete)
-
-
-def looped(item: tree.ForLoop, reader: Interpreter) -> Iterator[Interpreter]:
-    """What reads the body of a loop, once for each value of its iterators."""
-    readers = [reader]
-    for name, over in item.iterators:
-        readers = [inner.with_local(**{name: one}) for inner in readers for one in inner.steps(over)]
-    yield from readers
 
 
 def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any, Any]]:
@@ -149,26 +143,22 @@ def sides(item: tree.SimpleEquation, reader: Interpreter) -> Iterator[tuple[Any,
 
 def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
     """Two values that are equal, as expressions of the language."""
-    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        for one, other in zip(a, b, strict=True):
-            yield from pairs(one, other)
-        return
-    names, others = (_names(one) for one in (a, b))
-    if isinstance(a, list) or isinstance(b, list):
+    if values.all_sizes(a) != values.all_sizes(b):
         raise ModelError(
             f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
         )
+    if isinstance(a, np.ndarray) and not (values.is_plain(a) and values.is_plain(b)):
+        for one, other in zip(a.flat, b.flat, strict=True):
+            yield from pairs(one, other)
+        return
+    names, others = ([*one.names()] if hasattr(one, "member") else None for one in (a, b))
     if (names is None) != (others is None) or not {*(names or ())} <= {*(others or ())}:
         both = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
         raise ModelError(f"found {both} beside '=', expected two of one type")
     if names is not None:
         for name in names:
-            yield from pairs(_member(a, name), _member(b, name))
+            yield from pairs(a.member(name), b.member(name))
         return
-    if np.shape(a if isinstance(a, np.ndarray) else 0) != np.shape(b if isinstance(b, np.ndarray) else 0):
-        raise ModelError(
-            f"found sizes {values.size_words(a)} and {values.size_words(b)} beside '=', expected one size"
-        )
     if isinstance(a, np.ndarray) and not a.size:
         return
     left, right = values.to_casadi(a), values.to_casadi(b)
@@ -185,17 +175,6 @@ def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         yield left, right
 
 
-def _names(value: Any) -> list[str] | None:
-    """The members of a record; None for what is no record."""
-    if isinstance(value, values.RecordValue):
-        return [*value]
-    return [*cast(Members, value).names()] if hasattr(value, "member") else None
-
-
-def _member(value: Any, name: str) -> Any:
-    return value[name] if isinstance(value, values.RecordValue) else value.member(name)
-
-
 def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[Any]:
     try:
         a, b = reader.value(item.a), reader.value(item.b)
@@ -210,18 +189,14 @@ def _connections(item: tree.ConnectEquation, reader: Interpreter) -> Iterator[An
 
 
 def _ends(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
-    many = [isinstance(x, list) for x in (a, b)]
-    if any(many):
-        if not all(many) or len(a) != len(b):
-            sizes = [f"[{len(x)}]" if isinstance(x, list) else "of a scalar" for x in (a, b)]
-            raise ModelError(f"found connectors of the sizes {' and '.join(sizes)}, expected one size")
-        for one, other in zip(a, b, strict=True):
-            yield from _ends(one, other)
-        return
-    if values.size_words(a) != values.size_words(b):
+    if values.all_sizes(a) != values.all_sizes(b):
         words = " and ".join(map(values.size_words, (a, b)))
         raise ModelError(f"found connectors of the sizes {words}, expected one size")
     if 0 in values.all_sizes(a):
+        return
+    if isinstance(a, np.ndarray) and not values.is_plain(a):
+        for one, other in zip(a.flat, b.flat, strict=True):
+            yield from _ends(one, other)
         return
     found = [getattr(x, "instance", None) if hasattr(x, "member") else values.to_casadi(x) for x in (a, b)]
     if any(x is None or isinstance(x, (bool, int, float, str)) for x in found):
@@ -319,7 +294,7 @@ def _actions(items: Items, reader: Interpreter, inside: bool = False) -> Iterato
             for left, right in sides(item, reader):
                 yield left == right
         elif isinstance(item, tree.ForLoop):
-            for inner in looped(item, reader):
+            for inner in reader.looped(item.iterators):
                 yield from _actions(item.items, inner, inside)
         elif isinstance(item, tree.Branching) and item.word == "if":
             yield from _chosen(item, reader)

@@ -3,7 +3,6 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,12 +19,12 @@ from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier,
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
-from gantrytau.modelica.references import references
+from gantrytau.modelica.references import Members, references
 from gantrytau.modelica.shaping import ask, ask_for_shapes, is_known
 
 
 @dataclass(eq=False)
-class Structure:
+class Structure(Members):
     """An instance of a class: modifier says what is said of it from outside, whose values know their own instances.
 
     read: names of the parameters that shape it; folding: those whose values are asked for at the moment;
@@ -57,13 +56,12 @@ class Structure:
                 one.scope.refuse(one.at, f"{words}; extend {self.scope.name} to modify it")
         return {name: ClassMember(name, element, self) for name, element in self.scope.elements.items()}
 
-    def has(self, name: str) -> bool:
-        return name in self.scope.elements
-
-    def names(self) -> Sequence[str]:
-        return [*self.scope.elements]
+    @property
+    def structure(self) -> "Structure":
+        return self
 
     def shape(self, name: str) -> tuple[int, ...] | None:
+        """The sizes of a component; None where only its value has them."""
         one = self.members[name]
         return tuple(one.first_sizes) or one.shape
 
@@ -74,15 +72,6 @@ class Structure:
         while root.around is not None:
             root = root.around
         return f"{root.scope.definition.name}.{self.path}".rstrip(".")
-
-    def next_sample(self, call: tree.Call) -> Any:
-        raise ModelError(f"found {call.function.parts[0][0]}() in a value, expected it among equations")
-
-    def before(self, name: str, asked: str) -> Any:
-        return None
-
-    def turn(self, name: str) -> Any:
-        return None
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
@@ -150,10 +139,12 @@ class Structure:
             expand(self)
 
     def type_of(self, reference: tree.ComponentReference) -> str:
+        """Real, Integer, Boolean, String or the name of an enumeration; "" for all else."""
         one = self.leaf(reference)
         return "" if one is None else one.type_name
 
     def values_of(self, reference: tree.ComponentReference) -> range | None:
+        """The values of an Integer with min and max, 0 and 1 of a Boolean; None for another Integer."""
         one = self.leaf(reference)
         if one is None or one.kind == "Boolean":
             return range(2)
@@ -162,6 +153,7 @@ class Structure:
         return None if low is None or high is None else range(int(low), int(high) + 1)
 
     def is_fixed(self, expression: Any) -> bool:
+        """Whether it holds parameters and constants only."""
         return all(is_known(self, one) for one in references(expression))
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":

@@ -1,7 +1,7 @@
 """Values of expressions and what operators and functions make of them (Modelica 3.6, chapters 3.4 to 3.7 and 10).
 
 A value is a number, True or False, a text, a scalar symbol or expression of CasADi, an object array of NumPy of these
-(so that a vector of one element and a matrix of one column stay what they are), a list of components, or a record.
+(so that a vector of one element and a matrix of one column stay what they are), a component, or a record.
 """
 
 import operator
@@ -16,7 +16,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.language.events import delay
 from gantrytau.language.functions import fmax, fmin, if_else, logic_and, logic_not, logic_or, mod
 from gantrytau.language.symbols import der, pre
-from gantrytau.modelica.records.record_values import RecordValue, is_plain, record_value
+from gantrytau.modelica.records.record_values import RecordValue, boxed, is_plain, mapped
 
 
 class EnumerationValue(int):
@@ -35,9 +35,7 @@ class EnumerationValue(int):
 
 
 def array(items: Sequence[Any]) -> Any:
-    """Values of one shape as an array with one more dimension; components and records as a list."""
-    if not all(map(is_plain, items)):
-        return list(items)
+    """Values of one shape as an array with one more dimension."""
     shapes = {np.shape(one) if isinstance(one, np.ndarray) else () for one in items}
     if len(shapes) > 1:
         raise ModelError(
@@ -61,18 +59,13 @@ def from_casadi(symbol: ca.SX, shape: tuple[int, ...]) -> Any:
 
 
 def in_rows(items: Sequence[Any], shape: tuple[int, ...]) -> Any:
-    """Components that stand row after row as a list for each dimension; the one of a scalar."""
-    if not shape:
-        return items[0]
-    size = len(items) // shape[0] if shape[0] else 0
-    return [in_rows(items[k * size : (k + 1) * size], shape[1:]) for k in range(shape[0])]
+    """Components that stand row after row as an array; the one of a scalar."""
+    return array(items).reshape(shape) if shape else items[0]
 
 
 def all_sizes(value: Any) -> tuple[int, ...]:
-    """The sizes of an array, also one of components."""
-    if isinstance(value, list):
-        return (len(value), *(all_sizes(value[0]) if value else ()))
-    return np.shape(_shaped(value))
+    """The sizes of an array; none of all else."""
+    return value.shape if isinstance(value, np.ndarray) else ()
 
 
 def to_casadi(value: Any) -> Any:
@@ -101,28 +94,24 @@ def _plain(value: Any) -> Any:
 
 
 def _numeric(sign: str, value: Any) -> Any:
-    if isinstance(value, (str, list, RecordValue)) or not isinstance(
-        value, (bool, int, float, ca.SX, np.ndarray, np.number)
-    ):
+    if isinstance(value, str) or not is_plain(value):
         raise ModelError(f"found {_kind(value)} beside '{sign}', expected numbers")
     return value
 
 
 def _kind(value: Any) -> str:
-    kinds = {str: "a text", list: "an array of components", RecordValue: "a record", bool: "a Boolean"}
+    kinds = {
+        str: "a text", np.ndarray: "an array of components", RecordValue: "a record", bool: "a Boolean",
+    }  # fmt: skip
     return kinds.get(type(value), f"a {type(value).__name__}")
 
 
 def _same_shape(sign: str, a: Any, b: Any) -> None:
-    if np.shape(_shaped(a)) != np.shape(_shaped(b)):
+    if all_sizes(a) != all_sizes(b):
         raise ModelError(
             f"found sizes {size_words(a)} and {size_words(b)} beside '{sign}', expected one size; '.{sign}' takes "
             "a scalar for every element"
         )
-
-
-def _shaped(value: Any) -> Any:
-    return value if isinstance(value, np.ndarray) else 0
 
 
 def size_words(value: Any) -> str:
@@ -134,15 +123,6 @@ def size_words(value: Any) -> str:
 def sized(value: Any) -> str:
     """The same, as a noun."""
     return size_words(value).removeprefix("of ")
-
-
-def boxed(value: Any) -> Any:
-    """A value as an array of NumPy, a scalar without dimensions; NumPy itself would take a symbol apart."""
-    if isinstance(value, np.ndarray):
-        return value
-    found = np.empty((), dtype=object)
-    found[()] = value
-    return found
 
 
 def _spread(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -234,15 +214,15 @@ def condition(value: Any) -> Any:
 
 
 def chosen(test: Any, then: Any, otherwise: Any, smooth: bool) -> Any:
-    """`if test then ... else ...` where the test holds symbols; arrays and records element by element."""
-    if isinstance(then, list) and isinstance(otherwise, list):
-        return [chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)]
-    if not (is_plain(then) or is_plain(otherwise) or isinstance(then, list)):
-        a, b = record_value(then), record_value(otherwise)
-        return RecordValue({n: chosen(test, one, b[n], smooth) for n, one in a.items()}, a.scope)
-    if isinstance(then, np.ndarray) or isinstance(otherwise, np.ndarray):
+    """`if test then ... else ...` where the test holds symbols; arrays and records element by element.
+
+    What has no value yet in one of the branches, None, has none: it is told where it is asked for.
+    """
+    if then is otherwise or then is None or otherwise is None:
+        return then if then is otherwise else None
+    if isinstance(then, np.ndarray) or hasattr(then, "member"):
         _same_shape("else", then, otherwise)
-        return array([chosen(test, a, b, smooth) for a, b in zip(then, otherwise, strict=True)])
+        return mapped(lambda a, b: chosen(test, a, b, smooth), then, otherwise)
     return if_else(condition(test), then, otherwise, smooth=smooth)
 
 
@@ -280,8 +260,6 @@ def _size(value: Any, dimension: int | None = None) -> Any:
 
 
 def _filled(value: Any, *sizes: int) -> Any:
-    if not (is_plain(value) or value is None):
-        return [_filled(value, *sizes[1:]) if sizes[1:] else value] * sizes[0]
     found = np.empty(sizes, dtype=object)
     for place in np.ndindex(*sizes):
         found[place] = value
@@ -292,16 +270,8 @@ def _cat(axis: int, *parts: Any) -> Any:
     return np.concatenate([np.atleast_1d(boxed(one)) for one in parts], axis=axis - 1)
 
 
-def _cross(a: Any, b: Any) -> Any:
-    return array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
 def _skew(a: Any) -> Any:
     return array([array([0, -a[2], a[1]]), array([a[2], 0, -a[0]]), array([-a[1], a[0], 0])])
-
-
-def _square(value: Any) -> Any:
-    return np.diag(value) if isinstance(value, np.ndarray) else value
 
 
 def _truncated(x: Any) -> Any:
@@ -312,10 +282,6 @@ def _written(value: Any, *_: Any, **__: Any) -> str:
     if isinstance(value, EnumerationValue):
         return value.literal
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _differentiated(x: Any) -> Any:
-    return der(x) if isinstance(x, ca.SX) else 0.0
 
 
 PLAIN = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "sign")
@@ -343,23 +309,23 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sum": _reduced(operator.add, 0),
     "product": _reduced(operator.mul, 1),
     "size": _size,
-    "ndims": lambda value: np.ndim(_shaped(value)),
+    "ndims": lambda value: len(all_sizes(value)),
     "zeros": lambda *sizes: _filled(0, *sizes),
     "ones": lambda *sizes: _filled(1, *sizes),
     "fill": _filled,
     "identity": lambda n: np.eye(n, dtype=object),
-    "diagonal": _square,
+    "diagonal": np.diag,
     "linspace": lambda a, b, n: array([a + (b - a) * k / (n - 1) for k in range(n)]),
     "transpose": np.transpose,
-    "cross": _cross,
+    "cross": np.cross,
     "skew": _skew,
-    "outerProduct": lambda a, b: a[:, None] * b[None, :],
+    "outerProduct": np.outer,
     "vector": lambda value: np.ravel(boxed(value)),
-    "matrix": lambda value: np.atleast_2d(boxed(value)) if np.ndim(_shaped(value)) != 1 else value[:, None],
+    "matrix": lambda value: np.atleast_2d(boxed(value)) if len(all_sizes(value)) != 1 else value[:, None],
     "scalar": lambda value: value.item() if isinstance(value, np.ndarray) else value,
     "cat": _cat,
     "array": lambda *items: array(items),
-    "der": _elementwise(_differentiated),
+    "der": _elementwise(lambda x: der(x) if isinstance(x, ca.SX) else 0.0),
     "pre": _elementwise(lambda x: pre(x) if isinstance(x, ca.SX) else x),
     "edge": lambda b: logic_and(condition(b), logic_not(condition(pre(b)))),
     "change": lambda x: x != pre(x),
@@ -386,6 +352,9 @@ def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any
         raise ModelError(f"found {name}(), which is not supported here; {REFUSED[name]}")
     if name not in FUNCTIONS:
         raise ModelError(f"found '{name}(', expected a function{did_you_mean(name, FUNCTIONS)}")
+    divisors = boxed(arguments[-1]).flat if name in ("div", "mod", "rem") else ()
+    if any(is_number(y) and _plain(y) == 0 for y in divisors):
+        raise ModelError(f"found {name}(..., 0), expected a divisor other than zero")
     try:
         return FUNCTIONS[name](*arguments, **named)
     except TypeError as error:

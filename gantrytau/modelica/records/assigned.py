@@ -1,8 +1,7 @@
-"""What assignments and branches of an algorithm make of a value: an element or a member changed, one of two chosen."""
+"""What assignments of an algorithm make of a value: an element or a member changed; and the length of its loops."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any, cast
 
 import casadi as ca
@@ -39,42 +38,6 @@ def most_rounds(item: tree.WhileLoop, reader: Interpreter) -> int | None:
     return found
 
 
-def chosen_value(test: Any, then: Any, otherwise: Any) -> Any:
-    """The value of a variable behind an `if` whose test varies; None where it has none in one of the branches."""
-    if then is otherwise:
-        return then
-    if isinstance(then, list) and isinstance(otherwise, list):
-        return [chosen_value(test, a, b) for a, b in zip(then, otherwise, strict=True)]
-    if then is None or otherwise is None:
-        return None  # not yet known in one branch: told where it is asked for
-    if isinstance(then, np.ndarray) and np.shape(then) == np.shape(otherwise):
-        return np.frompyfunc(partial(chosen_value, test), 2, 1)(then, otherwise)
-    if isinstance(then, RecordValue):
-        each = {n: chosen_value(test, one, otherwise[n]) for n, one in then.items()}
-        return RecordValue(each, then.scope)
-    return values.chosen(test, then, otherwise, smooth=False)
-
-
-def value_before(value: Any) -> Any:
-    """A value before an instant, that of a record member by member."""
-    if isinstance(value, list):
-        return list(map(value_before, value))
-    if hasattr(value, "member"):
-        return RecordValue({n: value_before(value.member(n)) for n in value.names()}, value.scope)
-    return values.called("pre", [value], {})
-
-
-def unassigned(value: Any) -> Any:
-    """A value as it is before an assignment: None, also for each element of an array and each member of a record."""
-    if isinstance(value, np.ndarray):
-        return np.full(value.shape, None, dtype=object)
-    if isinstance(value, list):
-        return list(map(unassigned, value))
-    if hasattr(value, "member"):
-        return RecordValue({n: unassigned(value.member(n)) for n in value.names()}, value.scope)
-    return None
-
-
 def with_part(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:
     """A value with another one where a reference points to."""
     subscripts, rest = parts[0][1], parts[1:]
@@ -85,9 +48,7 @@ def with_part(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> 
         if not isinstance(old, RecordValue) or inner not in old:
             raise ModelError(f"found '{inner}' behind a dot, expected a member of a record")
         return RecordValue({**old, inner: with_part(old[inner], rest, new, reader)}, old.scope)
-    if isinstance(old, list):
-        return _with_component(old, parts, new, reader)
-    if rest or not isinstance(old, np.ndarray):
+    if not isinstance(old, np.ndarray):
         raise ModelError("found an element of no array of a known size assigned, expected an array")
     found = old.copy()
     axes = [*zip(subscripts, old.shape, strict=True)]
@@ -97,32 +58,18 @@ def with_part(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> 
     places = [reader.places(*axis) if place is None else range(axis[1]) for axis, place in every]
     many = [[place] if isinstance(place, int) else place for place in places]
     shape = tuple(len(place) for place in places if isinstance(place, list))
-    if np.shape(new if isinstance(new, np.ndarray) else 0) != shape:
+    if values.all_sizes(new)[: len(shape) if rest else None] != shape:
         raise ModelError(f"found {values.size_words(new)} assigned to {list(shape)}, expected one size")
     for index in np.ndindex(*map(len, many)):
         at = tuple(axis[k] for axis, k in zip(many, index, strict=True))
         inner = tuple(k for k, place in zip(index, places, strict=True) if isinstance(place, list))
-        one = new[inner] if shape else new
+        one = with_part(old[at], ((parts[0][0], ()), *rest), new[inner] if shape else new, reader)
         for place, k in zip(varying, at, strict=True):
-            one = one if place is None else chosen_value(changed(place, k + 1), old[at], one)
+            one = one if place is None else values.chosen(changed(place, k + 1), old[at], one, False)
         found[at] = one
     first = tuple(axis[0] for axis in many)
     for place, size in zip(varying, old.shape, strict=True):
         if place is not None:  # beyond the array there is no number, which ends a run
             inside = values.binary("and", place > 0.5, place < size + 0.5)
-            found[first] = chosen_value(inside, found[first], ca.sqrt(-1 - place**2))
-    return found
-
-
-def _with_component(old: list[Any], parts: Sequence[Any], new: Any, reader: Interpreter) -> list[Any]:
-    """The same of a list of records."""
-    (name, (first, *others)), found = parts[0], list(old)
-    inner = ((name, tuple(others)), *parts[1:])
-    places = replace(reader, end=len(old)).places(first, len(old))
-    if isinstance(places, int):
-        places, new = [places], [new]
-    if not isinstance(new, (list, np.ndarray)) or len(new) != len(places):
-        raise ModelError(f"found {values.size_words(new)} assigned to [{len(places)}], expected one size")
-    for place, one in zip(places, new, strict=True):
-        found[place] = with_part(old[place], inner, one, reader)
+            found[first] = values.chosen(inside, found[first], ca.sqrt(-1 - place**2), False)
     return found

@@ -1,6 +1,7 @@
 """Operators on operator records (Modelica 3.6, chapter 14): the function of the record that an operator means."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,14 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.scopes import ClassScope, Element
 from gantrytau.modelica.records.record_values import RecordValue
 
+SIGNS = {"sum": "+", "product": "*"}
 Call = Callable[[ClassScope, Sequence[Any], Mapping[str, Any]], Any]
 
 
 def operator_record(value: Any) -> ClassScope | None:
-    """The operator record that a value, or each value of a list, belongs to; None for another value."""
-    if isinstance(value, list):
-        return operator_record(value[0]) if value else None
+    """The operator record that a value, or each element of an array, belongs to; None for another value."""
+    if isinstance(value, np.ndarray):
+        return operator_record(value.flat[0]) if value.size else None
     holder = value if isinstance(value, RecordValue) else getattr(value, "structure", value)
     scope = getattr(holder, "scope", None)
     return _plain(scope) if scope is not None else None
@@ -37,6 +39,14 @@ def operated(sign: str, operands: Sequence[Any], call: Call) -> Any:
     return values.unary(sign, *operands) if len(operands) == 1 else values.binary(sign, *operands)
 
 
+def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any], call: Call) -> Any:
+    """The value of a function of the language; sum and product of operator records by their operators."""
+    items = np.ravel(arguments[0]) if name in SIGNS and len(arguments) == 1 else ()
+    if len(items) and operator_record(items[0]) is not None:
+        return reduce(lambda a, b: overloaded(SIGNS[name], [a, b], call), items)
+    return values.called(name, arguments, named)
+
+
 def overloaded(sign: str, operands: Sequence[Any], call: Call) -> Any:
     """The value of an operator of which at least one operand is of an operator record.
 
@@ -48,11 +58,11 @@ def overloaded(sign: str, operands: Sequence[Any], call: Call) -> Any:
     if function is not None:
         return call(function, operands, {})
     plain = [k for k, one in enumerate(operands) if operator_record(one) is None]
-    arrays = [one for one in operands if isinstance(one, (list, np.ndarray))]
+    arrays = [one for one in operands if isinstance(one, np.ndarray)]
     if arrays and (len(operands) == 1 or len(arrays) == 1 or (sign in "+-" and _alike(arrays))):
         count = range(len(arrays[0]))
-        rows = [[one[k] if isinstance(one, (list, np.ndarray)) else one for one in operands] for k in count]
-        return [overloaded(sign, row, call) for row in rows]
+        rows = [[one[k] if isinstance(one, np.ndarray) else one for one in operands] for k in count]
+        return values.array([overloaded(sign, row, call) for row in rows])
     if plain and not arrays:
         (k,) = plain
         converted = [call(record, [one], {}) if j == k else one for j, one in enumerate(operands)]

@@ -13,8 +13,8 @@ import numpy as np
 
 from gantrytau.border.refusal import SolveError
 from gantrytau.simulation import simulation_errors as run_ends
-from gantrytau.simulation.between.chatter import HOP, Chatter
-from gantrytau.simulation.events.crossings import at_zero, location_errors
+from gantrytau.simulation.between.chatter import HOP, Chatter, Hops
+from gantrytau.simulation.events.crossings import location_errors
 from gantrytau.simulation.events.impulses import Impulses, Infinite, possible_impulses
 from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.rounds import MOST, Made
@@ -26,7 +26,6 @@ from gantrytau.simulation.time_grid import Trail
 
 MOST_AT_ONCE = 8  # switches of which all choices are tried
 LONGEST_CIRCLE = 100  # choices of modes of which one leads to the next
-HOPS = 3  # of them, one after another
 
 
 class Changes:
@@ -39,6 +38,7 @@ class Changes:
         self.by_time = TimeEvents(coordinates.switches, coordinates.w, begin, begin + span)
         self._chatter = Chatter()
         self._rounded: np.ndarray | float = 0.0  # what rounding made of margins where it decided
+        self._cancels = False  # whether a margin is zero by an identity: its slopes do not tell its rounding
         self.ended = ""  # what a when said that ended the run
         dae, pieces = coordinates.dae, coordinates.pieces
         own = (coordinates.substitutions, tuple(coordinates.arguments), coordinates.states)
@@ -52,8 +52,8 @@ class Changes:
         self._timed = np.array([all(timed[k] for k in conditions) for conditions in coordinates.rounds.of])
         self._thrown = False  # whether states have jumped where something turned last
         self._holding = np.zeros(len(coordinates.rounds.whens), dtype=bool)  # its conditions, last
-        self._hops, self.acts = np.zeros((2, self._holding.size), dtype=int)  # acts: of each when, counted
-        self._acted: dict[int, tuple[float, np.ndarray]] = {}  # when: last time, rates of margins behind it
+        self.acts = np.zeros(self._holding.size, dtype=int)  # of each when, counted
+        self._hops = Hops()
         self._unsampled: tuple[int, np.ndarray, np.ndarray] | None = None  # a place before it was sampled
 
     def modes(self, k: int) -> np.ndarray:
@@ -71,7 +71,13 @@ class Changes:
 
     def margins(self, places: np.ndarray) -> SwitchMargins:
         """The margins at places."""
-        return self.coordinates.switches.look(*self.columns(places), self.sizes).blurred(self._rounded)
+        return self.look(*self.columns(places))
+
+    def look(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> SwitchMargins:
+        """The margins at states, algebraics, times and inputs, known no better than rounding lets them be."""
+        switches = self.coordinates.switches
+        found = switches.look(x, z, t, w, self.sizes).blurred(self._rounded)
+        return found.blurred(switches.rounding(x, z, t, w)) if self._cancels else found
 
     def conditions(self, switches: np.ndarray) -> list[str]:
         """Conditions of some switches, in the model's names."""
@@ -110,6 +116,8 @@ class Changes:
         if self._holding.size:
             self._unsampled = k, trail.held[k].copy(), trail.z[k].copy()
         new = np.array(self.coordinates.renewed(trail.x[k], trail.z[k], t, t, trail.inputs(k))).ravel()
+        for law in self.coordinates.dae.flat.laws:
+            law.obeyed(t, self.coordinates.held, due, new)
         for name, value, now in zip(self.coordinates.held, new, due, strict=True):
             if now and not np.isfinite(value):
                 raise run_ends.sampled_badly(self.coordinates.dae, t, name)
@@ -285,18 +293,10 @@ class Changes:
 
     def _watch_hops(self, acts: np.ndarray, t: float, before: SwitchMargins, after: SwitchMargins) -> None:
         """SolveError where a when acts again and again and its margin hardly leaves zero: rounding would decide."""
-        rates, noise = before.rates[0], before.noise[0]
-        passed = at_zero(before, t, self.coordinates.switches.whole(before.values)) & (rates != 0)
-        for i in np.flatnonzero(acts).tolist():
-            own = [k for k in self.coordinates.rounds.of[i] if passed[k]]
-            last, began = self._acted.get(i, (-np.inf, rates))
-            if t == last:  # another round of one instant
-                continue
-            away = np.maximum(np.abs(began[own]), np.abs(rates[own])) * (t - last) / 4  # of a parabola
-            self._hops[i] = self._hops[i] + 1 if own and np.all(away < HOP * noise[own]) else 0
-            if self._hops[i] >= HOPS:
-                raise run_ends.accumulating(self.coordinates.dae, t, self.coordinates.rounds.whens[i].label)
-            self._acted[i] = t, after.rates[0].copy()
+        whole, rounds = self.coordinates.switches.whole(before.values), self.coordinates.rounds
+        found = self._hops.found(np.flatnonzero(acts).tolist(), rounds.of, t, before, after, whole)
+        if found is not None:
+            raise run_ends.accumulating(self.coordinates.dae, t, rounds.whens[found].label)
 
     def _settled(self, k: int) -> np.ndarray:
         """The algebraics of a place."""
@@ -344,7 +344,7 @@ class Changes:
         found = []
         for modes in tried:
             self._led_to(k, modes, 0.0, before)
-            found.append(self.coordinates.switches.rounding(self.point(k)))
+            found.append(self.coordinates.switches.rounding(*self.columns(np.array([k])))[0])
         self.modes(k)[:] = tried[0]
         return np.max(found, axis=0)
 
@@ -398,3 +398,6 @@ class Changes:
         if what:
             told = run_ends.chattering if what == "chattering" else run_ends.never_past
             raise told(dae, t, self.conditions(turned))
+        if not self._cancels and self._chatter.crowded(turned, self.span):
+            rounded = self.coordinates.switches.rounding(*self.columns(np.array([k])))
+            self._cancels = bool(np.any(rounded[0, turned] > HOP * before.noise[0, turned]))

@@ -106,18 +106,20 @@ class Switches:
         return SwitchMargins(values, rates, noise)
 
     @cached_property
-    def _rounding(self) -> ca.Function:
+    def _rounding(self) -> AtPlaces:
         arguments, margins, algebraic = self._exact
-        return rounding(arguments, ca.vertcat(margins, algebraic))
+        return AtPlaces(rounding(arguments, ca.vertcat(margins, algebraic)))
 
-    def rounding(self, point: Point) -> np.ndarray:
-        """Rounding errors of the margins at a point, from all their terms, (switches,)."""
-        x, z, t, w = point
-        own, inner = np.split(np.nan_to_num(np.array(self._rounding(x, z, t, t, w)).ravel()), [len(self)])
+    def rounding(self, x: np.ndarray, z: np.ndarray, t: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Rounding errors of the margins at places, from all their terms, (places, switches)."""
+        [found] = self._rounding(x, z, t, t, w)
+        own, inner = np.split(np.nan_to_num(found), [len(self)], axis=1)
         if self._of_algebraics:
-            found = self._look(x[None], z[None], t, t, w[None], 1.0)
-            by_z, jacobian = (found[k].reshape(z.size, -1).T for k in (3, 4))
-            own += np.abs(by_z @ np.linalg.pinv(np.nan_to_num(jacobian))) @ inner
+            by_z, jacobian = (
+                a.reshape(len(t), z.shape[1], -1).transpose(0, 2, 1)
+                for a in self._look(x, z, t, t, w, np.ones((1, x.shape[1])))[3:5]
+            )
+            own += (np.abs(by_z @ np.linalg.pinv(np.nan_to_num(jacobian))) @ inner[:, :, None])[:, :, 0]
         return ALGEBRAICS * own
 
     def jumped(self, before: Point, after: Point) -> bool:

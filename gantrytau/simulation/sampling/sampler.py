@@ -60,11 +60,13 @@ class Sampler:
 
     @property
     def suits(self) -> bool:
-        """Whether the model can go this way: it samples, or is given samples, and has no friction that sticks, delays or
-        unknowns that are iterated.
+        """Whether the model can go this way: it samples, or is given samples, and has no friction that sticks, delays, laws
+        or unknowns that are iterated.
         """
         c = self.coordinates
-        if not (c.held or c.sampled) or not c.states or c.dae.flat.slips or c.dae.flat.delays:
+        if not (c.held or c.sampled) or not c.states or c.dae.flat.slips:
+            return False
+        if c.dae.flat.delays or c.dae.flat.laws:
             return False
         # from few corners to the next an integrator is quicker than steps that solve systems of equations
         if c.algebraics and not (c.held and c.kept("linear", lambda: linear(c))):

@@ -1,11 +1,12 @@
-"""A force control whose gain adapts to what it touches: it falls while the force swings, and rises slowly again.
+"""A force control with an adaptive gain: the gain falls while the contact force swings, and rises slowly afterwards.
 
     V_t = s K (f_ref n - f),    e = n.f - lowpass(n.f)
     s falls by T / fall in a period where the mean square of e is above limit^2, else it rises by T / rise, up to 1
 
-The loop through a surface bears K stiffness up to a critical gain and then swings, on a plate of metal with 68 Hz: who does
-not know the stiffness sees that. Dressler (2012), section 8.5, asks for a force law that is robust against stiffness and
-prints none: this one is ours. With noise of 20 mN it stays below the critical gain; without any noise nothing shows it.
+The loop is stable while K times the stiffness of the surface stays below a critical gain. Beyond it the force swings, on a
+metal plate with 68 Hz, and the swing reveals an unknown stiffness. Dressler (2012), section 8.5, asks for a force law that
+is robust against stiffness and prints none: this one is ours. With force noise of 20 mN the gain stays below the critical
+one; without noise the swing cannot be detected.
 """
 
 import math

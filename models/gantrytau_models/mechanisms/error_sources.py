@@ -55,7 +55,7 @@ class F1OnScrews(F1GantryTau):
 
 
 class SaggingArm(Model):
-    """One arm: a cart that stands at s, and a link that gives way along itself."""
+    """One arm: a cart at position s, and a link that is elastic along its axis."""
 
     length = Parameter(unit="m", min=0.0, description="length of the link without force")
     offset = Parameter(shape=3, unit="m", description="joint on the cart at s = 0 (4.7)")

@@ -51,7 +51,7 @@ double horizon_change(controller_state *it, const double *x, double *slack) {
 
 
 class CompiledHorizon:
-    """The functions of a library, with memory for one plan, which is that of `controller_state`."""
+    """The functions of a compiled library. It has memory for one plan, the one of `controller_state`."""
 
     def __init__(self, path: Path, stages: HorizonStages, elements: int):
         n, nx, nw, nu = elements, stages.nx, stages.nw, stages.nu

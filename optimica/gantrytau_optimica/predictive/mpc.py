@@ -22,11 +22,13 @@ from gantrytau_optimica.predictive.gauss_newton import STANDS, GaussNewton, Iter
 from gantrytau_optimica.predictive.loop.closed_loop import ClosedLoop
 from gantrytau_optimica.predictive.loop.driven_loop import driven_loop
 from gantrytau_optimica.predictive.loop.model_loop import PARTS, model_loop
+from gantrytau_optimica.predictive.loop.mpc_block import MpcBlock, mpc_block
 from gantrytau_optimica.predictive.loop.plant import DrivenPlant, check_problem
 from gantrytau_optimica.predictive.loop.sensors import Sensors
 from gantrytau_optimica.predictive.moves import Moves
 from gantrytau_optimica.predictive.plan import (
     PlannedMotion,
+    Status,
     StepTimes,
     first_plan,
     guessed_plan,
@@ -37,7 +39,6 @@ from gantrytau_optimica.predictive.terminal import SteadyState
 from gantrytau_optimica.predictive.unknowns import named_values, staged
 from gantrytau_optimica.problem.optimization import Optimization
 
-Status = Literal["solved", "not converged", "late", "lost", "failed"]
 PENALTY = 1e3  # times the largest curvature of the objective
 PASSED = 1e-6  # of the size of a limit: less is rounding
 MOST = 50  # iterations of the first plan, and of `converged`
@@ -257,8 +258,7 @@ class Mpc:
         after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
         """
         sensors = Sensors(self, noise or {}, seed, estimator)
-        self.reset()
-        self._preparations, self._steps, self._missed = [], [], 0
+        self.recall(None)
         step = self.period / PARTS
         if isinstance(plant, DrivenPlant):
             return driven_loop(self, plant, stop, sensors, wires, start or after)
@@ -266,6 +266,29 @@ class Mpc:
         own = plant is None
         other = (self.built, HorizonStages(self.built.problem, step)) if own else staged(plant, step)[:2]
         return model_loop(self, other, stop, start or {}, sensors, after)
+
+    def component(self) -> MpcBlock:
+        """The controller as a component of models, for `simulate`; each run of it begins with a new plan.
+
+        Its inputs are states and estimates, its outputs inputs of the plant: `connect(self.control.p, self.pole.p)`, or all
+        but estimates by their names, `yield from self.control.wired(pole=self.pole)`.
+        """
+        return mpc_block(self)
+
+    @property
+    def memory(self) -> Any:
+        """What a step takes from those before it."""
+        return self._plan, self._newton.applied, dict(self._estimates)
+
+    def recall(self, memory: Any) -> None:
+        """Be as with this memory; None: as before the first step, with no times taken."""
+        if memory is None:
+            self.reset()
+            self._preparations, self._steps, self._missed = [], [], 0
+            return
+        self._prepared = None
+        self._plan, self._newton.applied, estimates = memory
+        self._estimates |= estimates
 
     @property
     def key(self) -> tuple[Any, ...]:

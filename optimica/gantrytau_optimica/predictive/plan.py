@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
@@ -17,6 +17,7 @@ from gantrytau_optimica.control.control_problem import Signal
 from gantrytau_optimica.predictive.horizon_qp import Found
 from gantrytau_optimica.predictive.stages import NODES, HorizonStages, Linear
 
+Status = Literal["solved", "not converged", "late", "lost", "failed"]
 APART = 1e3  # times a measured state at which a plan begins that an outlier has spoilt
 
 

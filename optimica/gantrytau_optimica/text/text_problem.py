@@ -13,7 +13,6 @@ from gantrytau.modelica.elaboration import values
 from gantrytau.modelica.elaboration.classes import ModelicaModel
 from gantrytau.modelica.elaboration.placed import PlacedMembers
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
-from gantrytau.modelica.elaboration.statements import looped
 from gantrytau_optimica.problem.optimization import Optimization
 from gantrytau_optimica.text.timed_values import TimedInterpreter
 
@@ -67,7 +66,7 @@ class TextOptimization(ModelicaModel, Optimization):
             return 0.0
         scope, expression = found
         value = replace(self._reader(scope), instants=instants).value(expression)
-        if isinstance(value, (bool, str, list, np.ndarray)) or hasattr(value, "member"):
+        if isinstance(value, (bool, str, np.ndarray)) or hasattr(value, "member"):
             scope.refuse(expression.at, f"found {_kind(value)} as {name}, expected a number")
         return value
 
@@ -109,8 +108,7 @@ def _constraint(item: Any, reader: TimedInterpreter) -> Iterator[Any]:
             )
         yield from _rows(item.relation, reader.value(item.left), reader.value(item.right))
     elif isinstance(item, tree.ForLoop):
-        for inner in looped(item, reader):
-            assert isinstance(inner, TimedInterpreter)
+        for inner in reader.looped(item.iterators):
             yield from _constraints(item.items, inner)
     elif isinstance(item, tree.Branching) and item.word == "if":
         tests, chosen = reader.open_branches(item.branches, item.otherwise or ())
@@ -125,7 +123,7 @@ def _constraint(item: Any, reader: TimedInterpreter) -> Iterator[Any]:
 
 def _rows(relation: str, left: Any, right: Any) -> Iterator[Any]:
     """The scalars of a relation; one number may stand beside an array."""
-    if any(hasattr(side, "member") or isinstance(side, (list, str)) for side in (left, right)):
+    if not all(values.is_plain(side) and not isinstance(side, str) for side in (left, right)):
         raise ModelError(f"found a component or a text beside '{relation}', expected numbers")
     try:
         pairs = np.broadcast(values.boxed(left), values.boxed(right))

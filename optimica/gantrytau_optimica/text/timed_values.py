@@ -40,7 +40,7 @@ class TimedInterpreter(Interpreter):
         return name in self.local or self.members.has(name)
 
     def _refuse_bare(self, reference: tree.ComponentReference) -> None:
-        if reference.parts[0][0] not in self.local and not self.members.is_fixed(reference):
+        if reference.parts[0][0] not in self.local and not self.members.structure.is_fixed(reference):
             name = expression_written(reference)
             end = "finalTime" if name == "time" else f"{name}(finalTime)"
             raise ModelError(
@@ -57,13 +57,13 @@ class TimedInterpreter(Interpreter):
             raise ModelError(f"found the variable '{name}' called, expected one time, as {name}(finalTime)")
         (when,) = call.arguments
         signal = replace(self, instants="may").value(call.function)
-        if hasattr(signal, "member") or isinstance(signal, (list, str)):
+        if isinstance(signal, str) or not values.is_plain(signal):
             raise ModelError(f"found the component '{name}' called with a time, expected a variable of it")
         if values.is_number(signal):
             return signal
         if isinstance(when, tree.ComponentReference) and len(when.parts) == 1 and when.parts[0][0] in ENDS:
             return _each(ENDS[when.parts[0][0]], signal)
-        if not self.members.is_fixed(when):
+        if not self.members.structure.is_fixed(when):
             words = f"found {name}({expression_written(when)}), expected a time of numbers and parameters"
             raise ModelError(f"{words}, as {name}(finalTime)")
         instant = self.value(when)

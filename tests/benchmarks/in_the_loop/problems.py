@@ -5,13 +5,7 @@ import numpy as np
 
 from gantrytau import Array, Input, Model, Real, Start, between, connect, der, sqrt
 from gantrytau.mechanics.multibody import World
-from gantrytau_models import (
-    DeltaRobot,
-    GantryTau,
-    SixLinkGantryTau,
-    StewartPlatform,
-    prototypes,
-)
+from gantrytau_models import DeltaRobot, GantryTau, SixLinkGantryTau, StewartPlatform, prototypes
 from gantrytau_models.mechanisms.six_link import quaternion
 from gantrytau_models.mechanisms.wrist import WristJoint
 from gantrytau_optimica import Optimization

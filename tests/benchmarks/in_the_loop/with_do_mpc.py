@@ -83,7 +83,7 @@ class WithDoMpc(Mpc):
                 ]
             self._control.set_initial_guess()
         begin = process_time()
-        self._applied = np.asarray(self._control.make_step(x)).ravel()
+        self._newton.applied = np.asarray(self._control.make_step(x)).ravel()
         self.took.append(process_time() - begin)
         self.status = "solved" if self._control.solver_stats["success"] else "failed"
         return self.held

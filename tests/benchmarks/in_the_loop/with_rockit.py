@@ -66,7 +66,7 @@ class WithRockit(Mpc):
             self._guess_of_plan[1][: self.stages.nu] = first.u.T
         begin = process_time()
         self._guess_of_plan = [np.asarray(one) for one in self._solve(x, *self._guess_of_plan)]
-        self._applied = self._guess_of_plan[1][: self.stages.nu, 0]
+        self._newton.applied = self._guess_of_plan[1][: self.stages.nu, 0]
         self.took.append(process_time() - begin)
         self.status = "solved"
         return self.held

@@ -8,13 +8,7 @@ import pytest
 
 from gantrytau import ModelError
 from gantrytau_fmu.building import archive
-from gantrytau_fmu.building.archive import (
-    binary_members,
-    binary_path,
-    check_target,
-    universal,
-    write_archive,
-)
+from gantrytau_fmu.building.archive import binary_members, binary_path, check_target, universal, write_archive
 from gantrytau_fmu.building.platforms import PLATFORMS
 
 MEMBERS = {

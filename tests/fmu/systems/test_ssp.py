@@ -195,14 +195,8 @@ def test_inner_bindings_give_way_to_outer_ones(tmp_path, files):
             f"{connection('a.y', 'b.u')}{connection('b.y', 'b.u')}</ssd:Connections>",
             r"b\.u is driven by a\.y and by b\.y",
         ),
-        (
-            f"<ssd:Elements>{bound('Real', 'x')}</ssd:Elements>",
-            r"a\.k: found 'x', expected a number",
-        ),
-        (
-            f"<ssd:Elements>{bound('Binary', 'x')}</ssd:Elements>",
-            r"a\.k is of type Binary",
-        ),
+        (f"<ssd:Elements>{bound('Real', 'x')}</ssd:Elements>", r"a\.k: found 'x', expected a number"),
+        (f"<ssd:Elements>{bound('Binary', 'x')}</ssd:Elements>", r"a\.k is of type Binary"),
     ],
 )
 def test_what_is_not_supported_is_refused_by_name(tmp_path, files, inside, words):

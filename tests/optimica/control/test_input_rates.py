@@ -5,18 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gantrytau import (
-    Fixed,
-    Input,
-    Model,
-    ModelError,
-    Parameter,
-    Real,
-    between,
-    der,
-    simulate,
-    translate,
-)
+from gantrytau import Fixed, Input, Model, ModelError, Parameter, Real, between, der, simulate, translate
 from gantrytau_optimica import (
     Free,
     Optimization,

@@ -16,12 +16,7 @@ from tests.optimica.known_answers.closed_loops import PAIRS, turned
 class Bar(Optimization):
     """A linkage whose coupler and rocker, 0.5 m and 0.6 m, reach the crank of 0.9 m up to cos(phi) = 1 / 3."""
 
-    bar: Any = FourBar(
-        ground=1.0,
-        crank=0.9,
-        coupler=0.5,
-        rocker=0.6,
-    )
+    bar: Any = FourBar(ground=1.0, crank=0.9, coupler=0.5, rocker=0.6)
     final_time = Free(0.5, unit="s", min=0.02, max=5.0)
     end = 2.0
 

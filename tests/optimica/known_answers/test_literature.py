@@ -23,13 +23,7 @@ from tests.optimica.known_answers import psopt_problems as psopt
 from tests.optimica.known_answers.test_classics import HangGlider, ParticleSteering, Rayleigh, RobotArm
 from tests.optimica.known_answers.test_singular import CatalystMixing, Goddard
 from tests.optimica.known_answers.test_state_constraints import JacobsonLele
-from tests.optimica.problems import (
-    BoundedOscillator,
-    FastestMass,
-    FastestOscillator,
-    LinearQuadratic,
-    Mass,
-)
+from tests.optimica.problems import BoundedOscillator, FastestMass, FastestOscillator, LinearQuadratic, Mass
 
 
 class LimitedMass(FastestMass):

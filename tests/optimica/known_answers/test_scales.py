@@ -47,11 +47,7 @@ def fastest(length: float, time: float, guess: float = 5.0) -> list[float]:
 
     optimum = optimize(Fastest)
     slopes = sensitivities(optimum, ["lim", "d"]).objective
-    return [
-        optimum.final_time / time / 2,
-        -slopes["lim"] * length / time**3,
-        slopes["d"] * length / time,
-    ]
+    return [optimum.final_time / time / 2, -slopes["lim"] * length / time**3, slopes["d"] * length / time]
 
 
 def least_squares(length: float, time: float) -> list[float]:

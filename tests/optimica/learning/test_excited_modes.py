@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gantrytau import linearize
+from gantrytau import Result, linearize
 from gantrytau_models import FlexibleGantryTau
 from gantrytau_models.mechanisms.flexible import unstretched
 from gantrytau_optimica import identify_system
@@ -21,6 +21,11 @@ from tests.optimica.learning.flexible_runs import (
 LENGTH = 5 * (2**10 - 1)  # samples of a period of the sequences
 
 
+@pytest.fixture(scope="module")
+def run() -> Result:
+    return excited(flexible_rig(noise=Scatter()))
+
+
 def from_carts_to_gauge(hertz: np.ndarray) -> np.ndarray:
     """Response of the gauge to positions of the carts, (3, 3, F), of the robot without friction."""
     robot = FlexibleGantryTau(RECORD, friction=None, plate_mass=WRIST)
@@ -31,8 +36,7 @@ def from_carts_to_gauge(hertz: np.ndarray) -> np.ndarray:
     return np.stack([H[3:, :, k] @ np.linalg.inv(H[:3, :, k]) for k in range(len(hertz))], axis=-1)
 
 
-def test_gauge_follows_the_carts_as_the_linear_equations_say():
-    run = excited(flexible_rig(noise=Scatter()))
+def test_gauge_follows_the_carts_as_the_linear_equations_say(run):
     carts = run["measured.q"]
     assert np.std(carts - run["q_ref"], axis=0).min() > 2e-4  # m: friction and servos let them follow badly
     # the last period repeats the one before, so that its spectra have lines only
@@ -50,9 +54,8 @@ def kinematic_lines(run, lines) -> np.ndarray:
     return np.fft.rfft(kinematic_motion(run)[-LENGTH:], axis=0)[lines]
 
 
-def test_identified_resonances_are_the_printed_ones():
+def test_identified_resonances_are_the_printed_ones(run):
     """Table 6.4 and (6.13): 7.4, 10.5 and 11.5 Hz from a black box of order 10, and what it says of other data."""
-    run = excited(flexible_rig(noise=Scatter()))
     z, y = kinematic_motion(run), run["measured.r"]
     first, second = slice(0, 3000), slice(3000, None)
     found = identify_system(z[first], y[first], order=10, period=PERIOD)
@@ -65,9 +68,8 @@ def test_identified_resonances_are_the_printed_ones():
     assert np.all(blind.fit(z[second, :2], y[second, :2]) < found.fit(z[second], y[second])[:2])
 
 
-def test_servos_hide_the_pair_of_modes():
+def test_servos_hide_the_pair_of_modes(run):
     """(6.12), order 7, x and y: from references poles of the servos come first, and one pair near 10 Hz is left."""
-    run = excited(flexible_rig(noise=Scatter()))
     r, y = run["q_ref"], run["measured.r"][:, :2]
     found = identify_system(r[:3000], y[:3000], order=7, period=PERIOD)
     swings = found.poles[np.imag(found.poles) > 0]

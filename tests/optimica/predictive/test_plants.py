@@ -180,11 +180,8 @@ def test_names_are_joined_by_wires():
 @pytest.mark.parametrize(
     ("plant", "told"),
     [
-        (
-            "pole.fmu",
-            "expected a problem, or a plant that runs by itself: Controller('pole.fmu', period=...)",
-        ),
-        (Pole(), "expected a problem, or a plant that runs by itself"),
+        ("pole.fmu", "or a plant that runs by itself: Controller('pole.fmu', period=...)"),
+        (Pole(), "expected the same problem with other parameters, or a plant that runs by itself"),
     ],
 )
 def test_what_is_no_plant_is_told(plant, told):

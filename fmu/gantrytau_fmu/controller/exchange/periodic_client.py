@@ -1,4 +1,4 @@
-"""A client that computes its answers in a thread, every few samples, so that the wall clock does not wait for it."""
+"""A client that computes its answers in a thread, every few samples, so that the controller need not wait."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -44,7 +44,7 @@ class PeriodicClient:
         self._jobs = [*self._jobs[-1:], (sample.k, job)]
 
     def answer(self, k: int) -> Sample | None:
-        """The answer that acts in sample k; None before the first one, and while it is late."""
+        """The answer to apply in sample k; None before the first answer, and while an answer is late."""
         due = [job for begun, job in self._jobs if begun + self._every <= k]
         if not due or not due[-1].done():
             return None

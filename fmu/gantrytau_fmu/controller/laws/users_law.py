@@ -37,7 +37,7 @@ def users_law(controller: Any, wires: Mapping[str, str]) -> Law:
 
 
 def tunables_of(law: Law, parameters: Mapping[Channel, ArrayLike]) -> tuple[Declaration, Values]:
-    """Those that are given, f_activate, and those of the law, with their values; ModelError for values that are none."""
+    """Declaration and values of all tunables: `parameters`, f_activate and the law's own. ModelError for a bad value."""
     own = law.tunables
     channels = [*parameters, *own]
     values: dict[str, ArrayLike] = {channel.name: value for channel, value in parameters.items()}

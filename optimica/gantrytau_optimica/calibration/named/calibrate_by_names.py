@@ -97,7 +97,7 @@ def calibrate_by_names(
 
 
 def _no_better(found: NamedCalibration, start: np.ndarray) -> Iterator[Finding]:
-    """A finding where poses that were held out are farther from the fit than from what it began with."""
+    """A finding where the fit predicts the held-out poses worse than the parameters before the fit."""
     if not len(found.held_out):
         return
     data = replace(found.residuals, data=found.measurements.select(found.held_out), lever=1.0)

@@ -47,7 +47,7 @@ def check_problem(plant: Any, wires: Any) -> None:
             words = (
                 "of a rig: loop, starts = rig.at_rest(q); Controller(loop, period=rig.period, starts=starts)"
             )
-        words = f"expected a problem, or a plant that runs by itself: {words}"
+        words = f"expected the same problem with other parameters, or a plant that runs by itself: {words}"
         raise ModelError(words, place="run", found=Given("plant", plant))
     if wires:
         words = "found some and a problem as plant, expected them with one that runs by itself: names are the same here"

@@ -67,8 +67,7 @@ def linear_poses(count: int, *, turn: float, seed: int = 0) -> PoseArrays:
 
 
 @pytest.mark.parametrize(
-    ("orientation", "deficiency"),
-    [("local", [0, 2, 4]), ("free", [0, 2, 4]), ("unit", [0, 3, 6])],
+    ("orientation", "deficiency"), [("local", [0, 2, 4]), ("free", [0, 2, 4]), ("unit", [0, 3, 6])]
 )
 def test_rank_deficiency_of_the_f1(robot, poses, orientation, deficiency):
     found = identifiability(robot, poses, orientation)

@@ -305,11 +305,7 @@ def test_a_wrong_argument_is_refused(argument, call):
         ("too few points", 20, lambda q, p: linearity(q[:20], p[:20], intervals=30)),
         ("millimetres", 400, lambda q, p: linearity(1000 * q, p)),
         ("millimetres", 400, lambda q, p: linearity(1000 * q, 1000 * p, pitch=1000 * PITCH)),
-        (
-            "outliers",
-            1,
-            lambda q, p: linearity(np.where(np.arange(400) == 7, 50.0, q), p, pitch=PITCH),
-        ),
+        ("outliers", 1, lambda q, p: linearity(np.where(np.arange(400) == 7, 50.0, q), p, pitch=PITCH)),
     ],
 )
 def test_data_that_do_not_hold_what_is_asked_are_refused(kind, rows, call):
@@ -319,10 +315,7 @@ def test_data_that_do_not_hold_what_is_asked_are_refused(kind, rows, call):
 
 
 def test_figures_are_written(found, tmp_path):
-    for name, draw in (
-        ("errors.png", found.plot),
-        ("backlash.png", found.plot_backlash),
-    ):
+    for name, draw in (("errors.png", found.plot), ("backlash.png", found.plot_backlash)):
         draw(file=tmp_path / name)
         assert (tmp_path / name).stat().st_size > 5000
     with pytest.raises(ModelError, match="expected one of"):

@@ -287,21 +287,13 @@ U, Y = np.random.default_rng(0).normal(size=(2, 50, 2))
 @pytest.mark.parametrize(
     ("system", "error", "words"),
     [
-        (
-            StateSpace(np.eye(4) / 2, np.ones((4, 1)), np.ones((2, 4))),
-            ModelError,
-            "2 outputs and 1 inputs",
-        ),
+        (StateSpace(np.eye(4) / 2, np.ones((4, 1)), np.ones((2, 4))), ModelError, "2 outputs and 1 inputs"),
         (
             StateSpace(np.eye(10) / 2, np.ones((10, 2)), np.ones((2, 10)), period=0.004),
             ModelError,
             "order 10 with 2 positions, expected 4, a position and a speed each; identify a model of order 4, or with 5",
         ),
-        (
-            StateSpace(np.eye(7), np.ones((7, 2)), np.ones((2, 7))),
-            ModelError,
-            "identify a model of order 4$",
-        ),
+        (StateSpace(np.eye(7), np.ones((7, 2)), np.ones((2, 7))), ModelError, "identify a model of order 4$"),
         (StateSpace(-SYSTEM.A, SYSTEM.B, SYSTEM.C), IdentificationError, "unstable pole s = "),
         (
             StateSpace(1.05 * SYSTEM.discrete(PERIOD).A, SYSTEM.B, SYSTEM.C, period=PERIOD),

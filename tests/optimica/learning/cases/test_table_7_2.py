@@ -8,13 +8,7 @@ import pytest
 
 from gantrytau import Result
 from gantrytau_models import FlexibleGantryTau, GantryTau, PreslidingFriction, cart_servos, prototypes
-from gantrytau_optimica import (
-    Learning,
-    Rig,
-    Tukey,
-    learn,
-    square_reference,
-)
+from gantrytau_optimica import Learning, Rig, Tukey, learn, square_reference
 from gantrytau_optimica.learning import Scatter
 from gantrytau_optimica.learning.runs.robot_runs import forward_speed
 from tests.optimica.learning.runs.linear_plant import RESPONSE

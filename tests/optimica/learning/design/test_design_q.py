@@ -142,10 +142,7 @@ def test_moved_resonances_begin_no_earlier():
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (
-            lambda: design_q(one(), limit=200.0),
-            "limit=200.0, expected a number below 125",
-        ),
+        (lambda: design_q(one(), limit=200.0), "limit=200.0, expected a number below 125"),
         (lambda: design_q([]), "responses of another kind"),
         (lambda: design_q([one(), coupled(0.1)]), r"\[1, 2\] axes, expected one of both"),
         (

@@ -227,10 +227,7 @@ def test_what_does_not_fit_is_told_by_name(wrong, words):
         (lambda: Learning(law=cast(Any, "gradient")), "law='gradient', expected one such as Gradient"),
         (lambda: Learning(q=cast(Any, 10.0)), r"q=10.0, expected one such as ZeroPhase.butterworth"),
         (lambda: Learning(window=cast(Any, None)), "window=None, expected one such as Tukey"),
-        (
-            lambda: Reference([0.0, 0.004], np.zeros((2, 3))),
-            "found 2 rows of t, expected 3 at least",
-        ),
+        (lambda: Reference([0.0, 0.004], np.zeros((2, 3))), "found 2 rows of t, expected 3 at least"),
         (
             lambda: learn(LinearPlant(noise=1e-3), line(), Learning(window=WINDOW)),
             r"follows corrections; take response=estimated_response\(..., amplitude=0.003\)",

@@ -52,10 +52,7 @@ def with_row(text, number, row):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (
-            lambda text: text.replace("carts[1].s", "carts[4].s"),
-            r"no column 'carts\[1\].s'; did you mean",
-        ),
+        (lambda text: text.replace("carts[1].s", "carts[4].s"), r"no column 'carts\[1\].s'; did you mean"),
         (lambda text: "\n".join(text.splitlines()[:-1]), "found 399 rows, expected 400"),
         (lambda text: text.replace("0.008,", "0.009,", 1), "found the time 0.009 s in row 2"),
         (

@@ -6,15 +6,7 @@ import pytest
 from gantrytau import ModelError
 from gantrytau.kinematics.rotations import about
 from gantrytau_optimica.calibration.devices.sight import Bars
-from gantrytau_optimica.vision import (
-    Light,
-    Pattern,
-    Scene,
-    VisionError,
-    read_poses,
-    render,
-    true_corners,
-)
+from gantrytau_optimica.vision import Light, Pattern, Scene, VisionError, read_poses, render, true_corners
 from gantrytau_optimica.vision.opencv import opencv
 from tests.optimica.vision.camera_rig import LENS, MIDDLE, SIDE, TYPICAL, pair, places, scene, views
 
