@@ -111,7 +111,7 @@ def _highest_blocks(
     pattern = block_pattern(incidence, highest).blocks
 
     def guide(careful: bool) -> Guide:
-        found = Guide({**dae.start, **modes}, dae.table.values, states, careful=careful)
+        found = Guide({**dae.start, **modes}, dae.table.values, states, modes=modes, careful=careful)
         for block in dae.blocks:
             if not highest.keys() & set(block.unknowns):
                 block.enter(found)

@@ -128,3 +128,23 @@ def test_a_quadratic_takes_the_branch_of_the_start(side):
     assert block.solution is not None
     found = ca.substitute(block.solution[0], c, -6.0)
     assert float(ca.evalf(found)) == pytest.approx(1.0 + 2.0 * side, rel=1e-15)
+
+
+@pytest.mark.parametrize("slide", [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), (0.0, 0.0)])
+def test_pivots_that_jump_with_modes_are_not_divided_by(slide):
+    """Two coupled masses, each pulled by 2 N against friction of 0.3 N in terms of the path of its characteristic."""
+    a, f, path, mode = (ca.SX.sym(n, 2) for n in ("a", "f", "path", "mode"))
+    coupling = ca.DM([[2.0, 1.0], [1.0, 2.0]])
+    laws = (coupling @ a + f - 2, f - ca.if_else(mode, 0.3, path), a - ca.if_else(mode, path - 0.3, 0))
+    rows = ca.vertcat(*laws).elements()
+    residuals = {(k, 0): row for k, row in enumerate(rows)}
+    symbols = {s.name(): s for s in ca.vertcat(a, f, path).elements()}
+    modes = {m.name(): 1.0 for m in mode.elements()}
+    guide = Guide(dict.fromkeys(symbols, 0.0) | modes, (), (), modes=modes)
+    solved = solve_blocks([(tuple(residuals), tuple(symbols))], residuals, symbols, guide)
+    moving, *_ = solved.after(()).inserted([a])
+    found = np.ravel(ca.evalf(ca.substitute(moving, mode, ca.DM(slide))))
+    free = np.flatnonzero(slide)
+    expected = np.zeros(2)
+    expected[free] = np.linalg.solve(np.array(coupling)[np.ix_(free, free)], np.full(free.size, 1.7))
+    np.testing.assert_allclose(found, expected, atol=1e-15)

@@ -25,6 +25,7 @@ class Guide:
     the variable that it was solved for at a lower derivative, "" if in a block without closed order. The
     pivot at all higher derivatives is the same, so dividing by it again adds no singularity. firm: those of
     these equations whose pivot does not vanish where the equations still determine their unknowns.
+    modes: names of what jumps at events, and a pivot with it, perhaps to zero: it is not divided by.
     careful: divide only by pivots that do not vanish, and leave the others to be chosen by value.
     """
 
@@ -34,10 +35,12 @@ class Guide:
         parameters: Collection[str],
         states: Sequence[str],
         *,
+        modes: Collection[str] = (),
         careful: bool = False,
     ):
         self.start = start
         self.parameters = parameters
+        self.modes = modes
         self.careful = careful
         self.rates = frozenset(f"der({name})" for name in states)
         self.partners: dict[int, str] = {}

@@ -15,7 +15,7 @@ from gantrytau.compiler.blocks.circles_and_spheres import intersection
 from gantrytau.compiler.blocks.pieces import in_pieces, solve_by_value
 from gantrytau.compiler.blocks.pivots import Guide, Scales, reliable
 from gantrytau.compiler.blocks.quadratics import QuadraticRoot, quadratic_root
-from gantrytau.compiler.blocks.tearing import entry_sizes, moving, switching_places, tear
+from gantrytau.compiler.blocks.tearing import entry_sizes, moving, places_of, switching_places, tear
 from gantrytau.compiler.index_reduction import Key
 from gantrytau.compiler.symbol_spaces import Substitution, column
 from gantrytau.language.piecewise import Switched, may_switch, switched, with_modes
@@ -150,7 +150,8 @@ def solve_block(
     linear = not ca.depends_on(ca.vertcat(*jacobian.nonzeros()), x) if jacobian.nnz() else False
     (present,) = with_modes(smooth, [jacobian])
     numbers = guide.entries_around(present)
-    barred = switching_places(smooth, x)
+    jumping = places_of(jacobian, [leaf for leaf in ca.symvar(jacobian) if leaf.name() in guide.modes])
+    barred = switching_places(smooth, x) | jumping
     partners = {i: guide.partners[key[0]] for i, key in enumerate(equations) if key[0] in guide.partners}
     places = {split_derivative(name)[0]: j for j, name in enumerate(unknowns)}
     partner = {i: places.get(name, -1) for i, name in partners.items()}

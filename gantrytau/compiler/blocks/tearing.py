@@ -3,7 +3,7 @@
 Elmqvist and Otter, ESM 1994. The unknown to tear is the one after which most others follow at once.
 """
 
-from collections.abc import Collection, Mapping, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import casadi as ca
@@ -101,10 +101,14 @@ def switching_places(smooth: Switched, x: ca.SX) -> set[tuple[int, int]]:
 
 def moving(jacobian: ca.SX, parameters: Collection[str]) -> set[tuple[int, int]]:
     """Places of a Jacobian that do not depend on parameters alone."""
+    return places_of(jacobian, [leaf for leaf in ca.symvar(jacobian) if leaf.name() not in parameters])
+
+
+def places_of(jacobian: ca.SX, leaves: Sequence[ca.SX]) -> set[tuple[int, int]]:
+    """Places of a Jacobian that depend on some symbols."""
     rows, columns = jacobian.sparsity().get_triplet()
-    others = [leaf for leaf in ca.symvar(jacobian) if leaf.name() not in parameters]
-    places = zip(rows, columns, depending(jacobian.nonzeros(), others), strict=True)
-    return {(i, j) for i, j, moves in places if moves}
+    places = zip(rows, columns, depending(jacobian.nonzeros(), leaves), strict=True)
+    return {(i, j) for i, j, depends in places if depends}
 
 
 def _search(

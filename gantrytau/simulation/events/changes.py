@@ -320,12 +320,14 @@ class Changes:
                 changing = np.flatnonzero(modes != tried[0])
                 raise run_ends.no_side(self.coordinates.dae, float(t), self.conditions(changing))
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
-        changing = np.flatnonzero(np.ptp(tried, axis=0) > 0)
-        if changing.size <= MOST_AT_ONCE:
-            choices = product(*(np.unique([old[i] for old in tried]).tolist() for i in changing))
-            for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][changing]).sum()):
+        switches, changing = self.coordinates.switches, np.flatnonzero(np.ptp(tried, axis=0) > 0)
+        chosen = changing[~switches.derived[changing]]  # the others follow from these
+        if chosen.size <= MOST_AT_ONCE:
+            choices = product(*(np.unique([old[i] for old in tried]).tolist() for i in chosen))
+            for choice in sorted(choices, key=lambda c: np.abs(c - tried[0][chosen]).sum()):
                 modes = tried[0].copy()
-                modes[changing] = choice
+                modes[chosen] = choice
+                modes = switches.concluded(modes, w)
                 if np.array_equal(self._led_to(k, modes, errors, before), modes):
                     return
         # margins may follow from large numbers that cancel: then rates decide

@@ -45,7 +45,7 @@ class Switches:
     """What turns where its margin passes zero (or a whole number, if it counts).
 
     turns: in an order in which a margin holds modes before it only; timed: whether a margin depends on time and on
-    modes alone.
+    modes alone; derived: whether a mode follows from Discretes and modes, where none hangs on one behind it.
     """
 
     def __init__(self, turns: Sequence[Turn], arguments: Sequence[ca.SX], ode: ca.SX, algebraic: ca.SX):
@@ -59,6 +59,13 @@ class Switches:
         self.timed = [
             not ca.depends_on(turn.margin, moving) and ca.depends_on(turn.margin, time) for turn in turns
         ]
+        point = ca.vertcat(x, z, time, t0)
+        modes = ca.vertcat(*(turn.mode for turn in turns))
+        holds = np.array(ca.DM(ca.jacobian_sparsity(margins, modes), 1)) != 0 if turns else np.zeros((0, 0))
+        looped = np.triu(holds).any(axis=0)  # modes in margins of switches before them, or in their own
+        alone = [not ca.depends_on(turn.margin, point) for turn in turns]
+        self.derived = ~looped & np.array(alone, dtype=bool)
+        self._logic = ca.Function("logic", [point, arguments[-1]], [margins])
         self.margins = margins
         self._size = ca.SX.sym("size", x.numel())
         by_x, by_z, by_t = (ca.jacobian(margins, symbol) for symbol in (x, z, time))
@@ -127,6 +134,18 @@ class Switches:
         """The modes that belong to margins as the model writes it."""
         on = np.where(self._closed, margins >= 0, margins > 0)
         return np.where(self._counts, np.floor(margins), on)
+
+    def concluded(self, modes: np.ndarray, w: np.ndarray) -> np.ndarray:
+        """Modes with those that are derived as they follow from the others; w: as of a point."""
+        w, modes = w.copy(), modes.copy()
+        for _ in range(len(self)):
+            w[w.size - modes.size :] = modes
+            margins = np.array(self._logic(0, w)).ravel()
+            follow = np.where(self.derived, self.written(margins), modes)
+            if np.array_equal(follow, modes):
+                break
+            modes = follow
+        return modes
 
     def whole(self, margins: np.ndarray) -> np.ndarray:
         """Where margins turn: at the nearest whole number, if they count, else at zero."""
