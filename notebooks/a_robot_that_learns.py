@@ -155,11 +155,9 @@ other = Rig(
     noise=Scatter(),
     stiff=GantryTau(RECORD),
 )
+kalman = Kalman(arm_model(other, square))
 histories = {"1, actuators": by_actuators}
-for name, estimator in (
-    ("2A, accelerometer", Complementary()),
-    ("2B, Kalman", Kalman(arm_model(other, square))),
-):
+for name, estimator in (("2A, accelerometer", Complementary()), ("2B, Kalman", kalman)):
     seen = estimated_response(rig, square, estimator)
     learning = Learning(q=design_q(seen), window=window)
     histories[name] = learn(rig, square, learning, estimator, iterations=RUNS, seed=1, response=seen)
@@ -185,9 +183,8 @@ plot_learning(histories)
 # robot: so it costs nothing. Let the filter suit the tool, too, of which gauges told once.
 
 # %%
-kalman, frame = Kalman(arm_model(other, square)), np.array([7.4])  # Hz
-seen = estimated_response(rig, square, kalman)
-suits = design_q(seen, tool=response)
+frame = np.array([7.4])  # Hz
+suits = design_q(seen, tool=response)  # seen: the response by the Kalman filter, case 2B
 for title, filters in (("estimate", design_q(seen)), ("estimate and tool", suits), ("gauges", q)):
     print(f"Q at 7.4 Hz along x, by the {title}: {filters.magnitude(frame, PERIOD)[0, 0]:.2f}")
 learning = Learning(q=suits, window=window)

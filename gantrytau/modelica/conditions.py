@@ -80,19 +80,55 @@ def targets(items: Items) -> Iterator[str]:
 
 
 def joined_whens(items: Items) -> list[tree.EquationOrStatement]:
-    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first."""
+    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first.
+
+    What the former one sets alone, or does beside, stays a `when` before the chain.
+    """
     found: list[Any] = []
     for item in items:
         both = [one for one in (*found[-1:], item) if isinstance(one, tree.Branching) and one.word == "when"]
-        named = [frozenset(targets(inner)) for one in both for _, inner in one.branches]
-        values = [one.value for one in nodes_of(item) if isinstance(one, tree.Assignment)]
-        tests = [test for one in both for test, _ in one.branches]
-        reads = {one.parts[0][0] for one in references([values, tests])}
-        if len(both) == 2 and len(set(named)) == 1 and not reads & named[0]:
-            item = replace(both[1], branches=(*both[1].branches, *both[0].branches))
-            found.pop()
+        if len(both) == 2 and (parts := _parted(*both)) is not None:
+            alone, common = parts
+            found[-1:] = [replace(both[0], branches=alone)] if any(inner for _, inner in alone) else []
+            item = replace(both[1], branches=(*both[1].branches, *common))
         found.append(item)
     return found
+
+
+def _parted(first: tree.Branching, last: tree.Branching) -> tuple[Any, Any] | None:
+    """The branches of a `when` in an algorithm: what it sets alone, and what another one behind it sets as well.
+
+    None where there is nothing to join, or the two depend on each other.
+    """
+    own, others = (set(targets([one])) for one in (first, last))
+    shared = own & others
+    sure = [set(targets([i for i in items if isinstance(i, tree.Assignment)])) for _, items in last.branches]
+    each = [(one, set(targets([one]))) for _, items in first.branches for one in items]
+    mixed = any(names & shared and not names <= shared for _, names in each)
+    tests = [test for one in (first, last) for test, _ in one.branches]
+    if not shared or mixed or not all(shared <= names for names in sure):
+        return None
+    alone = any(not names & shared for _, names in each)
+    sampled = any(call for test, _ in first.branches for call in sample_calls(test))
+    read = [
+        one.value for one in nodes_of([last, first] if alone else last) if isinstance(one, tree.Assignment)
+    ]
+    if (alone and sampled) or _read_now([tests, read]) & own:
+        return None
+    return tuple(
+        tuple(
+            (test, tuple(i for i in items if bool({*targets([i])} & shared) is common))
+            for test, items in first.branches
+        )
+        for common in (False, True)
+    )  # type: ignore[return-value]
+
+
+def _read_now(e: Any) -> set[str]:
+    """Names of the variables of which an expression has another value than that before an instant."""
+    calls = [one for one in nodes_of(e) if isinstance(one, tree.Call) and is_call(one, "pre")]
+    before = {id(one) for call in calls for one in references(call.arguments)}
+    return {one.parts[0][0] for one in references(e) if id(one) not in before}
 
 
 def whens_in(structure: Any) -> Iterator[tree.Branching]:
@@ -190,6 +226,43 @@ def bound_pulses(declared: Mapping[str, Any]) -> Iterator[tree.EquationOrStateme
         if said is not None and said.value is not None and is_call(said.value, "sample"):
             left = tree.ComponentReference(said.at, ((name, ()),))
             yield from with_pulses([tree.SimpleEquation(said.at, None, None, "=", left, said.value)])
+
+
+def read_section(section: tree.ClassSection) -> tuple[str, tuple[tree.EquationOrStatement, ...]]:
+    """The kind and statements of a section; an algorithm whose assignments ask for their own values before is equations."""
+    items = tuple(with_pulses(one for one in section.items if not isinstance(one, tree.Element)))
+    each = [_assigned(one) for one in items] if section.kind == "algorithm" else []
+    names = [name for name, _ in each]
+    asked = {
+        whole_name(one.arguments[0])
+        for one in calls_before([value for _, value in each])
+        if is_call(one, "pre")
+    }
+    alone = "" not in names and len(set(names)) == len(names) and asked & {*names}
+    if not alone or any(_read_now(value) & {*names[k:]} for k, (_, value) in enumerate(each)):
+        return section.kind, items
+    left = [tree.ComponentReference(one.at, ((name, ()),)) for one, name in zip(items, names, strict=True)]
+    return "equation", tuple(
+        tree.SimpleEquation(one.at, None, None, "=", name, value)
+        for one, name, (_, value) in zip(items, left, each, strict=True)
+    )
+
+
+def _assigned(item: tree.EquationOrStatement) -> tuple[str, Any]:
+    """The name and the value of the one variable that an assignment, or each branch of an `if`, sets; "" for all else."""
+    if isinstance(item, tree.Assignment) and len(item.targets) == 1 and item.targets[0] is not None:
+        (name, subscripts), *rest = item.targets[0].parts
+        return ("", None) if subscripts or rest else (name, item.value)
+    if isinstance(item, tree.Branching) and item.word == "if" and item.otherwise:
+        branches = [*(items for _, items in item.branches), item.otherwise]
+        each: list[tuple[str, Any]] = [
+            _assigned(items[0]) if len(items) == 1 else ("", None) for items in branches
+        ]
+        if len({name for name, _ in each}) == 1:
+            *found, last = (value for _, value in each)
+            tests = (test for test, _ in item.branches)
+            return each[0][0], tree.Conditional(item.at, tuple(zip(tests, found, strict=True)), last)
+    return "", None
 
 
 def with_pulses(items: Iterable[tree.EquationOrStatement]) -> Iterator[tree.EquationOrStatement]:

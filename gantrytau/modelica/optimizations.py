@@ -17,7 +17,11 @@ def with_parameters(one: tree.ClassDefinition, source: SourceText) -> tree.Class
     body = one.body
     if not isinstance(body, tree.Composition):
         return one
-    sections = tuple(replace(s, items=tuple(_item(i, source) for i in s.items)) for s in body.sections)
+    inner = [
+        [with_parameters(i, source) if isinstance(i, tree.ClassDefinition) else i for i in s.items]
+        for s in body.sections
+    ]
+    sections = tuple(replace(s, items=tuple(items)) for s, items in zip(body.sections, inner, strict=True))
     stray = next((s for s in sections if s.kind == "constraint"), None)
     if one.kind != "optimization" and stray is not None:
         words = f"found constraints in the {one.kind} {one.name}, expected them in an optimization"
@@ -36,12 +40,6 @@ def with_parameters(one: tree.ClassDefinition, source: SourceText) -> tree.Class
     first = tree.ClassSection(one.at, "", tuple(own))
     last = tree.ClassSection(one.at, "equation", tuple(bound))
     return replace(one, body=replace(body, sections=(first, *sections, last)))
-
-
-def _item(
-    item: tree.Element | tree.EquationOrStatement, source: SourceText
-) -> tree.Element | tree.EquationOrStatement:
-    return with_parameters(item, source) if isinstance(item, tree.ClassDefinition) else item
 
 
 def _times(arguments: tuple[tree.AnyArgument, ...], source: SourceText) -> Iterator[tree.Argument]:

@@ -43,12 +43,10 @@ def is_known(structure: Any, reference: tree.ComponentReference) -> bool:
     """Whether a reference leads to a parameter or constant, or to a record of such."""
     if not structure.has(reference.parts[0][0]):
         return reference.parts[0][0] != "time"
-    here = structure
-    for name, _ in reference.parts:
-        one = here.members.get(name) if here is not None else None
-        if one is None or one.primitive is not None:
-            return one is None or one.is_parameter
-        here = one.children[0] if one.children else None
+    one = structure.component(reference)
+    if one is None or one.primitive is not None:
+        return one is None or one.is_parameter
+    here = one.sample
     return here is None or here.scope.definition.kind != "record" or _is_constant(here)
 
 

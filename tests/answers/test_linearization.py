@@ -243,27 +243,11 @@ class Faint(Model):
 @pytest.mark.parametrize(
     ("model", "options", "words"),
     [
-        (
-            Kepler,
-            dict(at={"w": 1.0}, steady=True),
-            r"steady state of Kepler: .*equation 1 is off by .* w held: hold",
-        ),
-        (
-            Torricelli,
-            dict(at={"h": 0.0}),
-            "derivatives of its equations are not finite at the operating point",
-        ),
+        (Kepler, dict(at={"w": 1.0}, steady=True), r"steady state of Kepler: .*equation 1 is off by .* w"),
+        (Torricelli, dict(at={"h": 0.0}), "derivatives of its equations are not finite at the operating"),
         # dM/dE = 1 - e cos E vanishes
-        (
-            Kepler,
-            dict(at={"E": 0.0, "w": 0.0}, parameters={"e": 1.0}),
-            "singular at the operating point: .* determine",
-        ),
-        (
-            Guided,
-            dict(),
-            "der.mass.v. depends on der.guide.s., the derivative of an input, which A, B, C, D cannot",
-        ),
+        (Kepler, dict(at={"E": 0.0, "w": 0.0}, parameters={"e": 1.0}), "singular at the operating point:"),
+        (Guided, dict(), "der.mass.v. depends on der.guide.s., the derivative of an input, which A, B, C, D"),
         (Faint, dict(outputs=["y"]), r"y depends on der\(u\)"),  # however small the factor
     ],
 )

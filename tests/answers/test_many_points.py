@@ -83,12 +83,16 @@ def test_branches_end_at_the_same_folds(model, widest):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
-def test_an_unknown_that_turns_back_is_no_end():
+@pytest.fixture(scope="module")
+def delta():
+    return translate(DeltaRobot(), units=False)
+
+
+def test_an_unknown_that_turns_back_is_no_end(delta):
     """The first shoulder of a delta robot stands still where the way to a pose is across its arm's circle."""
-    dae = translate(DeltaRobot(), units=False)
     r = np.array([[-0.56726626, -0.39382483, -0.3260063]])
-    (expected,) = one_by_one(dae, ["tool.r"], ["arms[0].phi"], [r])
-    (found,) = dae.array_function(["tool.r"], ["arms[0].phi"])(np.tile(r, (300, 1)))
+    (expected,) = one_by_one(delta, ["tool.r"], ["arms[0].phi"], [r])
+    (found,) = delta.array_function(["tool.r"], ["arms[0].phi"])(np.tile(r, (300, 1)))
     np.testing.assert_allclose(found, np.tile(expected, (300, 1)), atol=1e-12)
 
     # the same alone: sin(x) = y(q) with y back where it was at the start
@@ -101,12 +105,11 @@ def test_an_unknown_that_turns_back_is_no_end():
     assert float(ca.evalf(one)) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_sizes_of_none_one_and_many():
-    dae = translate(DeltaRobot(), units=False)
-    function = dae.array_function(["tool.r"], [*PHI, "tool.R"])
+def test_sizes_of_none_one_and_many(delta):
+    function = delta.array_function(["tool.r"], [*PHI, "tool.R"])
     assert [x.shape for x in function(np.zeros((0, 3)))] == [(0, 1)] * 3 + [(0, 9)]
     assert function.jacobian(np.zeros((0, 3))).shape == (0, 12, 3)
-    r = dae.evaluate()["tool.r"] + np.random.default_rng(0).uniform(-0.2, 0.2, (100_000, 3))
+    r = delta.evaluate()["tool.r"] + np.random.default_rng(0).uniform(-0.2, 0.2, (100_000, 3))
     r[17] = np.nan
     many = np.hstack(function(r))
     assert np.isnan(many[17]).all()
@@ -115,16 +118,16 @@ def test_sizes_of_none_one_and_many():
         np.testing.assert_allclose(np.hstack(function(r[:count])), many[:count], atol=1e-13)
 
 
-def test_arrays_of_other_shapes_are_refused():
-    function = translate(DeltaRobot(), units=False).array_function(["tool.r"], PHI)
+def test_arrays_of_other_shapes_are_refused(delta):
+    function = delta.array_function(["tool.r"], PHI)
     for arguments in ((), (np.zeros(3),), (np.zeros((2, 2)),), (np.zeros((2, 3)), np.zeros(2))):
         with pytest.raises(ModelError, match=r"expected tool.r \(N, 3\); one row a point"):
             function(*arguments)
 
 
-def test_what_is_not_determined_is_refused_at_once():
+def test_what_is_not_determined_is_refused_at_once(delta):
     with pytest.raises(StructureError, match="Undetermined"):
-        translate(DeltaRobot(), units=False).array_function(["arms[0].phi"], ["tool.r"])
+        delta.array_function(["arms[0].phi"], ["tool.r"])
 
 
 class Looked(Model):
@@ -172,10 +175,9 @@ def test_pivots_that_vanish_at_right_angles():
     np.testing.assert_allclose(z, 2 * np.sin(x) + np.cos(x), atol=1e-12)
 
 
-def test_exactly_symmetric_poses_of_a_delta_robot():
+def test_exactly_symmetric_poses_of_a_delta_robot(delta):
     """Poses on the axis, and turned by 120 degrees: joints are equal, and change places."""
-    dae = translate(DeltaRobot(), units=False)
-    function = dae.array_function(["tool.r"], PHI)
+    function = delta.array_function(["tool.r"], PHI)
     down = np.column_stack([np.zeros((300, 2)), np.linspace(-0.9, -0.5, 300)])
     q = np.hstack(function(down))
     np.testing.assert_allclose(q, np.repeat(q[:, :1], 3, axis=1), atol=1e-13)

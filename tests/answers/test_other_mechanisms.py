@@ -205,15 +205,9 @@ class WindyLift(Lift):
     ("change", "words"),
     [
         (dict(tool="tol.r"), "has no variable or parameter 'tol.r'; did you mean 'tool.r'"),
-        (
-            dict(tool="tool.v"),
-            r"tool: tool.v\[0\] of GantryTau is a speed, expected a coordinate that is free to",
-        ),
+        (dict(tool="tool.v"), r"tool: tool.v\[0\] of GantryTau is a speed, expected a coordinate that is"),
         (dict(tool="plate_mass"), "tool: plate_mass of GantryTau is a derivative, a parameter"),
-        (
-            dict(tool=["tool.r[0]", "tool.r[1]"]),
-            "found 2 tool, 3 joints, 3 forces; mobility 3 needs 3 of each",
-        ),
+        (dict(tool=["tool.r[0]", "tool.r[1]"]), "found 2 tool, 3 joints, 3 forces; mobility 3 needs 3 of"),
         (dict(joints="carts[0].s"), r"found the text 'carts\[0\].s', expected a list of names"),
         (dict(joints=["world.frame_b.r[0]", *CARTS[1:]]), "of GantryTau is constant, expected"),
         (dict(joints=[CARTS[0], *CARTS[:2]]), r"joints: carts\[0\].s of GantryTau is named twice"),
@@ -228,10 +222,7 @@ def test_wrong_names_and_counts_are_refused(robot, change, words):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (
-            dict(joints=[*CARTS[:2], "carts[0].body.frame_a.r[1]"]),
-            "the joints do not determine the tool. Undeter",
-        ),
+        (dict(joints=[*CARTS[:2], "carts[0].body.frame_a.r[1]"]), "the joints do not determine the tool"),
         (dict(tool=["tool.r[0]", "tool.r[1]", "tool.frame.r[1]"]), "cannot be moved at will by"),
         (dict(forces=[*FORCES[:2], "carts[2].friction"]), "leave accelerations of .* undetermined"),
         (dict(forces=[*FORCES[:2], "carts[0].actuator.f"]), "found . equations of balance .*, expected 3"),

@@ -193,10 +193,7 @@ def test_noise_has_its_deviation_and_its_colour(bandwidth):
     ("block", "words"),
     [
         (SampleHold(period=0.0), r"block.*period"),
-        (
-            DiscreteTransferFunction(numerator=[1.0, 2.0, 3.0], denominator=[1.0, 0.5]),
-            "found a numerator of degree 2 over a denominator of degree 1, expected at most the same",
-        ),
+        (DiscreteTransferFunction(numerator=[1.0, 2.0, 3.0], denominator=[1.0, 0.5]), "found a numerator of"),
         (DiscreteTransferFunction(numerator=[1.0], denominator=[0.0, 0.5]), "does not begin with zero"),
         (DiscreteTransferFunction(numerator=[1.0], denominator=[1.0]), "denominator of degree 0"),
     ],

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import casadi as ca
@@ -25,21 +26,31 @@ def ends_by_peers(
     """Name of the peer -> state -> value at the end, and processor time, s; or in words why there is none.
 
     Constraints are differentiated until there are rates of all states, which start consistently; nothing holds them later.
+    Forces that are not linear in these equations stay unknowns: of index one, for IDA alone.
     """
     coordinates = all_coordinates(translate(model), {})
     x, z, _ = coordinates.start(0.0, np.zeros(0))
-    rate = coordinates.ode
-    if z.size:  # forces, which are linear in it
+    rate, unknown = coordinates.ode, coordinates.x
+    moving = np.ones(x.size)  # what has a rate
+    if z.size:  # forces
         matrix = ca.jacobian(coordinates.algebraic, coordinates.z)
-        right = ca.substitute(coordinates.algebraic, coordinates.z, ca.SX.zeros(z.size))
-        rate = ca.substitute(rate, coordinates.z, ca.solve(matrix, -right))
+        if ca.depends_on(matrix, coordinates.z):
+            rate, unknown = ca.vertcat(rate, coordinates.algebraic), ca.vertcat(unknown, coordinates.z)
+            moving, x = np.append(moving, np.zeros(z.size)), np.append(x, z)
+        else:
+            right = ca.substitute(coordinates.algebraic, coordinates.z, ca.SX.zeros(z.size))
+            rate = ca.substitute(rate, coordinates.z, ca.solve(matrix, -right))
     rate = ca.substitute(rate, coordinates.t0, 0.0)
-    arguments = [model_time, coordinates.x]
+    arguments = [model_time, unknown]
     f = ca.Function("f", arguments, [rate], {"cse": True})
-    jacobian = ca.Function("j", arguments, [ca.densify(ca.jacobian(rate, coordinates.x))], {"cse": True})
-    sizes = np.array(coordinates.sizes or np.ones(x.size))
+    jacobian = ca.Function("j", arguments, [ca.densify(ca.jacobian(rate, unknown))], {"cse": True})
+    sizes = np.array(coordinates.sizes or [])
+    sizes = np.append(sizes, np.ones(x.size - sizes.size))
     found: dict[str, tuple[Mapping[str, float], float] | str] = {}
-    for name, solve in (("radau", _radau), ("ida", _ida)):
+    for name, solve in (("radau", _radau), ("ida", partial(_ida, moving=moving))):
+        if name == "radau" and not moving.all():
+            found[name] = "not explicit"
+            continue
         begin = time.process_time()
 
         def watched(t: float, y: np.ndarray, begin: float = begin) -> np.ndarray:
@@ -50,7 +61,7 @@ def ends_by_peers(
         try:
             end = solve(watched, lambda t, y: np.asarray(jacobian(t, y)), x, stop, tolerance, sizes)
             found[name] = (
-                dict(zip(coordinates.states, end.tolist(), strict=True)),
+                dict(zip(coordinates.states, end.tolist(), strict=False)),
                 time.process_time() - begin,
             )
         except TooLong:
@@ -73,20 +84,31 @@ def _radau(
 
 
 def _ida(
-    f: Rates, jacobian: Rates, x: np.ndarray, stop: float, tolerance: float, sizes: np.ndarray
+    f: Rates,
+    jacobian: Rates,
+    x: np.ndarray,
+    stop: float,
+    tolerance: float,
+    sizes: np.ndarray,
+    moving: np.ndarray,
 ) -> np.ndarray:
     from sksundae.ida import IDA  # pyright: ignore[reportMissingImports]
 
     def residual(t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray) -> None:
-        res[:] = yp - f(t, y)
+        res[:] = moving * yp - f(t, y)
 
     def slopes(t: float, y: np.ndarray, yp: np.ndarray, res: np.ndarray, cj: float, JJ: np.ndarray) -> None:
-        JJ[:] = cj * np.eye(x.size) - jacobian(t, y)
+        JJ[:] = cj * np.diag(moving) - jacobian(t, y)
 
     solver: Any = IDA(
-        residual, jacfn=slopes, rtol=tolerance, atol=tolerance * sizes, max_num_steps=10_000_000
+        residual,
+        jacfn=slopes,
+        rtol=tolerance,
+        atol=tolerance * sizes,
+        max_num_steps=10_000_000,
+        algebraic_idx=np.flatnonzero(moving == 0) if not moving.all() else None,
     )
-    found = solver.solve(np.array([0.0, stop]), x, f(0.0, x))
+    found = solver.solve(np.array([0.0, stop]), x, moving * f(0.0, x))
     if not found.success:
         raise ArithmeticError(found.message)
     return found.y[-1]

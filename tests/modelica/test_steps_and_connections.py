@@ -44,9 +44,9 @@ TEXT = """package Lines
     der(x) = 1;
     der(counted) = 0;
     n = if x < 1 then 0 else if x < 2 then 1 else 2;
-    when n == 1 then
+    when n == 1 or n == 7 then
       reinit(counted, pre(counted) + 10);
-    elsewhen n <> 0 then
+    elsewhen n <> 0 and x > 0 then
       reinit(counted, pre(counted) + 1);
     end when;
   end Steps;

@@ -24,10 +24,11 @@ from gantrytau import (
     simulate,
     sin,
     tan,
+    terminate,
     time,
     when,
 )
-from gantrytau.simulation.between.chatter import accumulate
+from gantrytau.simulation.between.chatter import CROWD, Chatter, accumulate
 from gantrytau.simulation.events.crossings import located
 from gantrytau.simulation.events.margins import SwitchMargins
 from gantrytau.simulation.events.poles import without_poles
@@ -142,6 +143,28 @@ class Accumulating(Model):
 def test_what_turns_without_leaving_its_switch_is_told(model, stop):
     with pytest.raises(SolveError, match=r"the condition on .*x turns back and forth without end"):
         simulate(model(), stop=stop)
+
+
+class Balanced(Model):
+    """A sum of products that is zero by an identity, whatever the states; rounding gives it a sign."""
+
+    a = Real(start=0.0, fixed=True)
+    b = Real(start=0.0, fixed=True)
+    off = Real()
+
+    def equations(self):
+        yield der(self.a) == 110 * sin(31 * time)
+        yield der(self.b) == 120 * sin(37 * time) - self.a
+        a, b = self.a, self.b
+        yield self.off == sum(sin(k * a + b) - sin(k * a) * cos(b) - cos(k * a) * sin(b) for k in range(1, 4))
+        yield when(fabs(self.off) > 1e-3, terminate("out of balance"))
+
+
+def test_what_is_zero_by_an_identity_does_not_turn_by_rounding(monkeypatch):
+    turns, found = [], Chatter.found
+    monkeypatch.setattr(Chatter, "found", lambda *given: turns.append(given[1]) or found(*given))
+    assert simulate(Balanced(), stop=1.0).ended == "stop"
+    assert len(turns) <= CROWD  # so many tell that rounding makes them
 
 
 def test_turns_that_accumulate_at_a_pole_are_told(monkeypatch):

@@ -359,9 +359,7 @@ class HeldAtInstants(Model):
 
 
 def test_a_position_that_a_discrete_lets_jump_is_refused():
-    with pytest.raises(
-        SolveError, match=r"at t = 1 s n and m turns, and drive.s would jump at once, for which drive.f"
-    ):
+    with pytest.raises(SolveError, match=r"at t = 1 s n and m turns, and drive.s would jump at once, for"):
         simulate(HeldAtInstants(), stop=2.0)
 
 

@@ -106,12 +106,8 @@ def test_texts_say_what_it_does():
     law = "floor.f = sign(floor.v)*floor.f_c + floor.f_v*floor.v"
     assert f"friction: {law}; at rest as floor.v = 0 needs, up to floor.f_s" in dae.equations()
     assert "at rest as floor.v = 0 needs" in dae.equations("base-modelica")
-    assert r"; at rest as $\mathit{floor}.v$ = 0 needs, up to $\mathit{floor}.f_{s}$" in dae.equations(
-        "latex"
-    )
-    assert "; at rest as floor.v = 0 needs, up to floor.f<sub>s</sub>" in re.sub(
-        "</?a.*?>", "", dae.equations("html")
-    )
+    assert r"; at rest as $\mathit{floor}.v$ = 0 needs, up to" in dae.equations("latex")
+    assert "; at rest as floor.v = 0 needs, up to" in re.sub("</?a.*?>", "", dae.equations("html"))
 
 
 def test_what_needs_equations_that_stay_refuses_it():

@@ -147,12 +147,8 @@ def test_a_title_is_no_markup_and_nothing_is_fetched():
 
 
 def test_files_of_other_kinds_are_told_and_one_result_has_its_title(tmp_path):
-    with pytest.raises(
-        ModelError, match=r"x\.pdf: found the suffix of another kind of file, expected \.html"
-    ):
+    with pytest.raises(ModelError, match=r"x\.pdf: found the suffix of another kind of file, expected"):
         browse(run(), file=tmp_path / "x.pdf")
-    with pytest.raises(
-        ModelError, match=r"found the file fall\.nc, .*`gantrytau browse fall\.nc` shows a saved"
-    ):
+    with pytest.raises(ModelError, match=r"found the file fall\.nc, .*`gantrytau browse fall\.nc` shows a"):
         browse("fall.nc")
     assert "<h1>first run</h1>" in browse(run(), titles=["first run"]).text

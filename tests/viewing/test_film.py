@@ -116,9 +116,7 @@ def refused(call):
 
 
 def test_what_cannot_be_shown_is_told(fall):
-    assert "animate: found float, expected what simulate or optimize returned; view(model)" in refused(
-        lambda: animate(3.0)
-    )
+    assert "animate: found float, expected what simulate or optimize" in refused(lambda: animate(3.0))
     assert "found an empty list" in refused(lambda: animate([]))
     for names in (["a"], "ab"):
         message = refused(lambda names=names: animate([fall, fall], names=names))
@@ -131,9 +129,7 @@ def test_what_cannot_be_shown_is_told(fall):
 
 def test_a_model_without_anything_to_be_seen_is_told():
     message = refused(lambda: view(Pendulum(drawn=False)))
-    assert (
-        "Pendulum: found nothing that could be shown, expected components of mechanics.multibody" in message
-    )
+    assert "Pendulum: found nothing that could be shown, expected components of" in message
     assert "shapes()" in message
 
 

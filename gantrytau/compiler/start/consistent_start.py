@@ -88,16 +88,21 @@ def _consistent_start(
         whole = [indexed.with_initial[free]] if initial else []
         return solve_levels(whole, values, held=fixed, started=guess.started, title=title, anew=anew)
 
+    # an initial equation may belong to the first level: a position that was moved without it leads nowhere afterwards
+    placed = _with_initial(flat, reduced, stages) if initial else None
+    if placed:
+        with contextlib.suppress(InitializationError):
+            return led(placed, guess.chosen)
     try:
         return led(stages, guess.chosen, not held)
     except InitializationError as error:
         refuse_outside(flat, reduced, guess.values, error)
         if held or not (guess.fixed or initial):
             raise
-        # equations may have no value before the initial ones hold, a fixed start belong to a later level than the states
-        # that follow it, and an initial equation to the first level
+        # equations may have no value before the initial ones hold, and a fixed start belong to a later level than the states
+        # that follow it
         attempts = [[]] if initial else []
-        attempts += [[indexed.whole], *([_with_initial(flat, reduced, stages)] if initial else [])]
+        attempts += [[indexed.whole], *([placed] if placed else [])]
         for anew, levels in product((False, True), attempts):
             with contextlib.suppress(InitializationError):
                 return led(levels, frozenset(), anew=anew)
@@ -135,15 +140,30 @@ def refuse_outside(
             raise InitializationError(words, place=flat.name, residuals=error.residuals) from None
 
 
-def _with_initial(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> list[Level]:
-    """The levels, the first one with the initial equations in which no unknown of another level stands."""
+def _with_initial(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> list[Level] | None:
+    """The levels, the first one with the initial equations in which no unknown of another level stands, but for signals.
+
+    A signal follows from known numbers by an equation of its own, as the angle that a source prescribes.
+    """
     first, *others = stages
     later = {n for s in others for n in s.unknowns}
+    every = later.union(first.unknowns)
     rows = reduced.to_reduced(ca.vertcat(*(e.residual for e in flat.initial_equations))).elements()
-    own = [k for k, row in enumerate(rows) if later.isdisjoint(leaf_names([row]))]
-    names = tuple(f"initial equation of {flat.initial_equations[k].name}" for k in own)
-    residuals = (*first.residuals, *(rows[k] for k in own))
-    return [Level(residuals, (*first.names, *names), first.unknowns, first.exact), *others]
+    foreign = [later.intersection(leaf_names([row])) for row in rows]
+    asked, signals = set().union(*foreign), dict[str, tuple[ca.SX, str]]()
+    for level in others if asked else ():
+        for residual, name in zip(level.residuals, level.names, strict=True):
+            inside = every.intersection(leaf_names([residual]))
+            if len(inside) == 1 and inside <= asked:
+                signals[inside.pop()] = residual, name
+    own = [k for k, names in enumerate(foreign) if names <= signals.keys()]
+    if not own:
+        return None
+    used = {n: signals[n] for k in own for n in sorted(foreign[k])}
+    residuals = (*first.residuals, *(r for r, _ in used.values()), *(rows[k] for k in own))
+    names = (*first.names, *(n for _, n in used.values()))
+    names += tuple(f"initial equation of {flat.initial_equations[k].name}" for k in own)
+    return [Level(residuals, names, (*first.unknowns, *used), first.exact), *others]
 
 
 def _initial_level(flat: FlatModel, reduced: Reduced, stages: list[Level]) -> Level:

@@ -13,6 +13,7 @@ LONGEST_STEP = 0.7  # of a value without a scale of its own: about what an angle
 NOTHING = 1e-11  # of the largest singular value, below which one counts as zero
 SQUARE = 1e8  # condition below which a square system has one solution, whatever the weights
 LARGE = 20  # equations from which on elimination is quicker than singular values
+BALANCE = 1e-3  # between residuals and unknowns that are solved together: singular values as small keep their digits
 DENSE = 50_000  # elements of a matrix from which on it is sparse
 
 Matrix = Any  # np.ndarray or scipy.sparse.csr_array, (m, n)
@@ -95,17 +96,64 @@ class _Steps:
         """The step with this damping."""
         if not damping and self._only is not None:
             return self._only
-        along, sizes, right = self._singular
-        known = sizes > NOTHING * sizes[:1]
-        shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
-        return right.T @ (shares * along)
+        if not isinstance(self._matrix, np.ndarray):
+            step = self._sparse(damping)
+            if step is not None:
+                return step
+        step = np.zeros(self._matrix.shape[1])
+        largest = max((float(sizes[0]) for _, _, sizes, _ in self._singular), default=0.0)
+        for columns, along, sizes, right in self._singular:
+            known = sizes > NOTHING * largest
+            shares = np.where(known, sizes / np.maximum(sizes**2 + damping, 1e-300), 0.0)
+            step[columns] = right.T @ (shares * along)
+        return step
 
     @cached_property
-    def _singular(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The target along the left singular vectors, the singular values, and the right singular vectors."""
-        matrix = self._matrix if isinstance(self._matrix, np.ndarray) else self._matrix.toarray()
-        left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
-        return left.T @ self.target, sizes, right
+    def _singular(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Of each part of the equations that shares no unknown with others: its columns, the target along its left singular
+        vectors, its singular values, and its right singular vectors.
+        """
+        found = []
+        for rows, columns in self._parts():
+            part = self._matrix[rows][:, columns]
+            part = part if isinstance(part, np.ndarray) else part.toarray()
+            left, sizes, right = np.linalg.svd(part, full_matrices=False)
+            found.append((columns, left.T @ self.target[rows], sizes, right))
+        return found
+
+    def _parts(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Rows and columns of the parts of a sparse matrix that share nothing; all of a dense one."""
+        m, n = self._matrix.shape
+        if isinstance(self._matrix, np.ndarray):
+            return [(np.arange(m), np.arange(n))] if m and n else []
+        from scipy.sparse import block_array
+        from scipy.sparse.csgraph import connected_components
+
+        there = self._matrix.copy()
+        there.data = (there.data != 0).astype(float)
+        there.eliminate_zeros()
+        _, part = connected_components(block_array([[None, there], [there.T, None]]), directed=False)
+        both = np.intersect1d(part[:m], part[m:])
+        return [(np.flatnonzero(part[:m] == k), np.flatnonzero(part[m:] == k)) for k in both]
+
+    def _sparse(self, damping: float) -> np.ndarray | None:
+        """The step by elimination of residuals and unknowns together; None where that would lose its digits.
+
+        With r = target - matrix @ step, either matrix.T @ r = damping * step, or step = matrix.T @ r of the least length.
+        """
+        from scipy.sparse import block_array, csc_array, eye_array
+
+        m, n = self._matrix.shape
+        wide = n > m and not damping  # of many solutions the shortest
+        first, second, matrix = (n, m, self._matrix.T) if wide else (m, n, self._matrix)
+        lower = None if not damping else -damping / BALANCE * eye_array(second)
+        whole = csc_array(block_array([[BALANCE * eye_array(first), matrix], [matrix.T, lower]]))
+        solve = _well_conditioned(whole)
+        if solve is None:
+            return None
+        if wide:
+            return solve(np.concatenate([np.zeros(n), self.target]))[:n]
+        return solve(np.concatenate([self.target, np.zeros(n)]))[m:]
 
     @cached_property
     def _only(self) -> np.ndarray | None:
@@ -113,26 +161,33 @@ class _Steps:
         rows, columns = self._matrix.shape
         if rows != columns or rows < LARGE:
             return None
-        largest = float(abs(self._matrix).sum(axis=0).max())
         if isinstance(self._matrix, np.ndarray):
             from scipy.linalg import get_lapack_funcs
 
             factorize, condition, solve = get_lapack_funcs(("getrf", "gecon", "getrs"), (self._matrix,))
+            largest = float(np.abs(self._matrix).sum(axis=0).max())
             factors, pivots, singular = factorize(self._matrix)
             if singular or not condition(factors, largest)[0] * SQUARE > 1:
                 return None
             return solve(factors, pivots, self.target)[0]
-        from scipy.sparse import linalg
+        solve = _well_conditioned(self._matrix.tocsc())
+        return None if solve is None else solve(self.target)
 
-        sparse: Any = linalg
-        try:
-            factors = sparse.splu(self._matrix.tocsc())
-        except RuntimeError:  # exactly singular
-            return None
-        inverse = sparse.LinearOperator(
-            self._matrix.shape, matvec=factors.solve, rmatvec=lambda v: factors.solve(v, "T"), dtype=float
-        )
-        return factors.solve(self.target) if largest * sparse.onenormest(inverse) < SQUARE else None
+
+def _well_conditioned(matrix: Any) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The solution of a square sparse system by elimination, where its condition leaves digits."""
+    from scipy.sparse import linalg
+
+    sparse: Any = linalg
+    try:
+        factors = sparse.splu(matrix)
+    except RuntimeError:  # exactly singular
+        return None
+    inverse = sparse.LinearOperator(
+        matrix.shape, matvec=factors.solve, rmatvec=lambda v: factors.solve(v, "T"), dtype=float
+    )
+    largest = float(abs(matrix).sum(axis=0).max())
+    return factors.solve if largest * sparse.onenormest(inverse) < SQUARE else None
 
 
 def _sound(f: np.ndarray, jacobian: Matrix) -> bool:

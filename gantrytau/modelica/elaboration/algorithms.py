@@ -12,7 +12,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import Items, joined_whens, targets
 from gantrytau.modelica.elaboration import values
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings, first_result
+from gantrytau.modelica.elaboration.interpreter import Interpreter, first_result
 from gantrytau.modelica.elaboration.kinds import fits, is_array_type, is_longer, type_of, type_of_value
 from gantrytau.modelica.elaboration.modifiers import Element
 from gantrytau.modelica.elaboration.scopes import ClassScope
@@ -128,8 +128,8 @@ class Execution:
     def _check_shape(self, name: str, value: Any) -> None:
         shape, plain = self.shapes.get(name), (np.ndarray, bool, int, float, ca.SX)
         if shape is not None and isinstance(value, plain) and np.shape(values.boxed(value)) != shape:
-            wanted = values.sized(np.empty(shape))
-            words = f"found {values.sized(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
+            wanted = values.size_words(np.empty(shape))
+            words = f"found {values.size_words(value)} for '{name}' of {self.reader.scope.name}, expected {wanted}"
             raise ModelError(words)
 
     def declare(self, name: str, element: Element, value: Any) -> None:
@@ -178,8 +178,8 @@ class Execution:
         """A `while` of varying length: its statements once for each possible round, each time under its condition."""
         count = most_rounds(item, reader)
         if count is None:
-            words = "found a loop whose length varies, expected 'while i < n' with a known n, a subscript i, and i := i + 1"
-            reader.scope.refuse(item.at, words)
+            words = "found a loop whose length varies, expected 'while i < n' with a known n and a subscript i, or"
+            reader.scope.refuse(item.at, f"{words} 'while a[i] < x', and i := i + 1 in it")
         once = tree.Branching(item.at, None, None, "if", ((item.condition, item.items),), None)
         outer = self.left["break"]
         for _ in range(count):
@@ -256,20 +256,17 @@ def called_class(
     scope: ClassScope,
     arguments: Sequence[Any],
     named: Mapping[str, Any],
-    beyond: Surroundings,
-    known: tuple[Members, Members | None],
+    library: Any,
+    holder: Members | None,
 ) -> Any:
-    """The value of a function, several as a tuple, or of the constructor of a record.
-
-    known: the constants of its package, and the instance of whose members its modifications speak.
-    """
+    """The value of a function, several as a tuple, or of the constructor of a record; as `ModelicaLibrary.call`."""
     definition = scope.definition
     if scope.is_external_object and (made := scope.inherited_class("constructor")) is not None:
         scope = made
     if definition.kind == "record" and (
         made := function_for(scope, "constructor", (*arguments, *named.values()))
     ):
-        return beyond.call(made, arguments, named)
+        return library.call(made, arguments, named)
     record = definition.kind == "record" or scope.definition is not definition
     if not record and definition.kind != "function":
         raise ModelError(f"found a call of {scope.name}, which is a {definition.kind}, expected a function")
@@ -278,13 +275,16 @@ def called_class(
     inputs = {n: e for n, e in scope.elements.items() if whole or "input" in e.clause.prefixes}
     given = _given(scope, inputs, arguments, named)
     longer = [] if record else [n for n, one in given.items() if is_longer(inputs[n], one)]
-    if longer:
-        each = [called_class(scope, (), one, beyond, known) for one in _one_by_one(scope, given, longer)]
-        return values.array(each)
+    if len({len(given[n]) for n in longer}) > 1:
+        found = " and ".join(values.size_words(given[n]) for n in longer)
+        raise ModelError(f"found arrays of the sizes {found} for scalars of {scope.name}, expected one size")
+    if longer:  # a function of scalars is called with each element
+        each = zip(*(given[n] for n in longer), strict=True)
+        calls = [given | dict(zip(longer, one, strict=True)) for one in each]
+        return values.array([called_class(scope, (), one, library, holder) for one in calls])
     if external is not None and external.language == "builtin":
         return values.called(external.function or definition.name, [given[n] for n in inputs], {})
-    constants, holder = known
-    run = Execution(Interpreter(scope, constants, beyond), {})
+    run = Execution(Interpreter(scope, library.package(scope), library))
     for name, element in (scope.elements if external is None and not record else inputs).items():
         run.declare(
             name, element, given[name] if name in given else _initial(element, run, holder, name in inputs)
@@ -305,17 +305,6 @@ def called_class(
         raise ModelError(f"found {scope.name} to end without a value of its output '{missing}', expected one")
     found = tuple(run.known[n] for n in outputs)
     return found if len(found) != 1 else first_result(found)
-
-
-def _one_by_one(
-    scope: ClassScope, given: Mapping[str, Any], longer: Sequence[str]
-) -> Iterator[Mapping[str, Any]]:
-    """Arguments of each call of a function of scalars, of which some are given arrays."""
-    if len({len(given[n]) for n in longer}) > 1:
-        found = " and ".join(values.size_words(given[n]) for n in longer)
-        raise ModelError(f"found arrays of the sizes {found} for scalars of {scope.name}, expected one size")
-    for k in range(len(given[longer[0]])):
-        yield {n: one[k] if n in longer else one for n, one in given.items()}
 
 
 def _external(scope: ClassScope, external: tree.ExternalFunction, run: Execution) -> Any:

@@ -37,7 +37,7 @@ from gantrytau.modelica.conditions import (
     whens_in,
 )
 from gantrytau.modelica.elaboration.algorithms import stated_by_algorithm
-from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, merged, plain
+from gantrytau.modelica.elaboration.modifiers import Modifier, StatementSection, annotated, merged, plain
 from gantrytau.modelica.elaboration.placed import Bound, PlacedMembers
 from gantrytau.modelica.elaboration.quantities import add_quantity, keywords_of
 from gantrytau.modelica.elaboration.scopes import ClassScope
@@ -86,7 +86,7 @@ class TextClass(Declared):
         if not found:
             return cls
         old = cls.structure
-        above = Structure(old.scope, merged(plain(found), old.modifier), old.beyond, old.path)
+        above = Structure(old.scope, merged(plain(found), old.modifier), old.library, old.path)
         above.prepare()
         return class_of(above, cls)
 
@@ -120,7 +120,7 @@ class ModelicaConnector(TextClass, Connector):
 
         def residual(structure: Structure, one: Any, another: Any) -> Any:
             function = cast(ClassScope, structure.scope.inherited_class("equalityConstraint"))
-            found = structure.beyond.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
+            found = structure.library.call(function, [PlacedMembers(one), PlacedMembers(another)], {})
             return to_casadi(found) if np.size(found) else ca.SX(0, 1)
 
         yield from closing(self, other, residual)
@@ -199,10 +199,9 @@ def class_of(structure: Structure, base: type[Any] | None = None) -> type[Any]:
         body[sample_name(call)] = Discrete(0, description="1 where the run ends")
     if _asks_for_start(structure):
         body[AT_START] = Discrete(1.0, description="1 at the start, else 0")
-    if is_connector(structure):
-        return type(scope.definition.name, (kind,), body)
-    body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
-    body["annotated_experiment"] = experiment_of(structure)
+    if not is_connector(structure):
+        body["inner_names"] = frozenset(n for n, one in structure.members.items() if "inner" in one.prefixes)
+        body["annotated_experiment"] = experiment_of(structure)
     return type(scope.definition.name, (kind,), body)
 
 
@@ -321,28 +320,24 @@ def _component(one: ClassMember) -> Any:
         return _opened(class_of(child), keywords_of(child, one.own, owner))
     found = Array(Declared, 0)
     found.shape = one.shape
+    first = _form(one.children[0]) if one.children else None
     for child, said in zip(one.children, one.own.of_elements(one.shape), strict=True):
-        same = found.elements and not child_differs(one.children[0], child)
+        same = found.elements and _form(child) == first
         made: Any = found.component if same else class_of(child)
         found.component = found.component if found.elements else made
         found.elements.append(_opened(made, keywords_of(child, said, owner)))
     return found
 
 
-def child_differs(a: Structure, b: Structure) -> bool:
-    """Whether two elements of an array have different values of what shapes them."""
-    if a.members.keys() != b.members.keys():
-        return True  # expandable connectors
-    for name, one in a.members.items():
-        other = b.members[name]
-        if one.primitive is not None:
-            if one.is_folded and one.full.value is not None and str(_known(one)) != str(_known(other)):
-                return True
-        elif (one.present, one.shape) != (other.present, other.shape) or any(
-            child_differs(x, y) for x, y in zip(one.children, other.children, strict=True)
-        ):
-            return True
-    return False
+def _form(structure: Structure) -> list[Any]:
+    """What shapes an instance: elements of an array with equal forms are of one class."""
+    found: list[Any] = []
+    for name, one in structure.members.items():
+        if one.primitive is None:
+            found.append((name, one.present, one.shape, [*map(_form, one.children)]))
+        else:
+            found.append((name, str(_known(one)) if one.is_folded and one.full.value is not None else ""))
+    return found
 
 
 def _opened(cls: type[Any], keywords: Mapping[str, Any]) -> Any:
@@ -353,19 +348,11 @@ def _opened(cls: type[Any], keywords: Mapping[str, Any]) -> Any:
 
 def experiment_of(structure: Structure) -> dict[str, float]:
     """The numbers of the annotation `experiment`."""
-    for one in structure.scope.definition.annotation or ():
-        if isinstance(one, tree.Argument) and one.name == "experiment" and one.modification is not None:
-            said = [
-                a for a in one.modification.arguments or () if isinstance(a, tree.Argument) and a.modification
-            ]
-            found = {a.name: a.modification.value for a in said if a.modification is not None}
-            reader = structure.interpreter(structure.scope)
-            return {
-                n: float(reader.value(v))
-                for n, v in found.items()
-                if isinstance(v, (tree.Number, tree.Unary))
-            }
-    return {}
+    said = annotated(structure.scope.definition.annotation, "experiment")
+    entries = [one for one in (said and said.arguments) or () if isinstance(one, tree.Argument)]
+    found = {one.name: one.modification.value for one in entries if one.modification is not None}
+    reader = structure.interpreter(structure.scope)
+    return {n: float(reader.value(v)) for n, v in found.items() if isinstance(v, (tree.Number, tree.Unary))}
 
 
 def _sections(instance: Any, initial: bool) -> Iterator[Any]:

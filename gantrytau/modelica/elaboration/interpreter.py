@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, Self, cast
+from typing import Any, Self, cast
 
 import casadi as ca
 import numpy as np
@@ -31,26 +31,6 @@ from gantrytau.modelica.references import (
 FAULTS = (RuntimeError, TypeError, NotImplementedError, ValueError, IndexError, KeyError, ArithmeticError)
 
 
-class Surroundings(Protocol):
-    """What lies beyond an expression: constants of packages, and functions."""
-
-    def package(self, scope: ClassScope) -> Members:
-        """The constants of a package."""
-        ...
-
-    def call(
-        self,
-        scope: ClassScope,
-        arguments: Sequence[Any],
-        named: Mapping[str, Any],
-        holder: Members | None = None,
-    ) -> Any:
-        """The value of a function, or of the constructor of a record; several results as a tuple.
-
-        holder: the instance of whose members modifications of the function speak.
-        """
-
-
 def changed(new: Any, old: Any) -> Any:
     """Whether a Boolean, Integer or number of an enumeration is another one."""
     return logic_or(new > old + 0.5, new < old - 0.5)
@@ -65,6 +45,7 @@ def first_result(value: Any) -> Any:
 class Interpreter:
     """Evaluates expressions of a class in an instance.
 
+    library: the ModelicaLibrary, which has the constants of packages and calls functions;
     local: values of iterators and of what a function computes; end: the size that `end` means; quiet: no events;
     settled: values before an instant are those behind it; following: inside of a `when`, the variables whose changes are its
     condition.
@@ -72,7 +53,7 @@ class Interpreter:
 
     scope: ClassScope
     members: Members
-    library: Surroundings
+    library: Any
     local: Mapping[str, Any] = field(default_factory=dict)
     end: int | None = None
     quiet: bool = False

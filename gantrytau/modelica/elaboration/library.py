@@ -12,7 +12,7 @@ from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.elaboration.algorithms import called_class
 from gantrytau.modelica.elaboration.classes import class_of
-from gantrytau.modelica.elaboration.modifiers import NOTHING
+from gantrytau.modelica.elaboration.modifiers import NOTHING, annotated
 from gantrytau.modelica.elaboration.scopes import ClassScope
 from gantrytau.modelica.elaboration.structure import Structure
 from gantrytau.modelica.optimizations import with_parameters
@@ -148,8 +148,11 @@ class ModelicaLibrary:
         named: Mapping[str, Any],
         holder: Members | None = None,
     ) -> Any:
-        """The value of a function, or of the constructor of a record; holder: of whose members its modifications speak."""
-        return called_class(scope, arguments, named, self, (self.package(scope), holder))
+        """The value of a function, several as a tuple, or of the constructor of a record.
+
+        holder: the instance of whose members modifications of the function speak.
+        """
+        return called_class(scope, arguments, named, self, holder)
 
 
 Library = TypeVar("Library", bound=ModelicaLibrary)
@@ -325,14 +328,8 @@ def _in_folders(folders: Sequence[Path], name: str, root: ClassScope) -> ClassSc
 
 def version_of(definition: tree.ClassDefinition, used: str = "") -> str:
     """The version of a package, or the version of another package that its `uses` asks for; "" where it says none."""
-    arguments: Iterable[Any] = definition.annotation or ()
-    value = None
-    for name in (*(("uses", used) if used else ()), "version"):
-        said = [one for one in arguments if isinstance(one, tree.Argument) and one.name == name]
-        if not said or (one := said[0].modification) is None:
-            return ""
-        arguments, value = one.arguments or (), one.value
-    return value.text.strip('"') if isinstance(value, tree.StringLiteral) else ""
+    said = annotated(definition.annotation, *(("uses", used) if used else ()), "version")
+    return said.value.text if said is not None and isinstance(said.value, tree.StringLiteral) else ""
 
 
 def _numbers(version: str) -> tuple[int, ...]:

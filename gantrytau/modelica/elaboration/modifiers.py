@@ -101,6 +101,22 @@ class Modifier:
 NOTHING = Modifier()
 
 
+def annotated(arguments: tree.Annotation, *names: str) -> tree.Modification | None:
+    """What an annotation says under a name, or under names one inside of another; None where it says nothing."""
+    found = None
+    for name in names:
+        said = (one for one in arguments or () if isinstance(one, tree.Argument) and one.name == name)
+        if (found := next((one.modification for one in said), None)) is None:
+            return None
+        arguments = found.arguments
+    return found
+
+
+def is_false(said: Modifier | None) -> bool:
+    """Whether a modification says `false`, as `fixed = false`."""
+    return said is not None and isinstance(said.value, tree.BooleanLiteral) and not said.value.value
+
+
 def read_modification(
     found: tree.Modification | None, scope: Any, each: bool = False, final: bool = False
 ) -> Modifier:

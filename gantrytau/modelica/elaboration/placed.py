@@ -131,7 +131,7 @@ class Bound(Formula):
         alike = self.shape in (None, shape) or (self.modifier.each and not shape)
         if not alike and isinstance(self.modifier.value, tree.TreeNode):
             hint = "" if shape else "; 'each' before the name takes one value for all"
-            words = f"found {values.sized(found)}, expected {values.sized(np.empty(self.shape or ()))}{hint}"
+            words = f"found {values.size_words(found)}, expected {values.size_words(np.empty(self.shape or ()))}{hint}"
             self.modifier.scope.refuse(self.modifier.at, words)
         found = values.to_casadi(found)
         return float(found) if isinstance(found, bool) else found

@@ -21,7 +21,7 @@ from gantrytau.language.declarations import (
 from gantrytau.modelica import tree
 from gantrytau.modelica.conditions import is_call
 from gantrytau.modelica.elaboration.kinds import check_type
-from gantrytau.modelica.elaboration.modifiers import Modifier
+from gantrytau.modelica.elaboration.modifiers import Modifier, annotated
 from gantrytau.modelica.elaboration.placed import Bound
 from gantrytau.modelica.elaboration.structure import ClassMember, Structure
 from gantrytau.modelica.overdetermined.records import is_overdetermined, is_propagated, propagated_quantity
@@ -55,7 +55,8 @@ def add_quantity(body: dict[str, Any], one: ClassMember, held: bool, before: Bou
     if one.is_parameter:
         for key in ("start", "fixed", "free"):
             words.pop(key, None)
-        fold = _flag(one, "Evaluate")
+        said_fold = annotated(one.element.declaration.annotation, "Evaluate")
+        fold = said_fold is not None and said_fold.value == tree.BooleanLiteral(0, True)
         body[name] = made = Parameter(said.get("value"), shape=one.shape, evaluate=fold, **words)
         made.final = one.full.final
         made.free = is_free(one)
@@ -90,14 +91,6 @@ def _is_differentiated(one: ClassMember) -> bool:
     nodes = (node for section in one.owner.scope.sections for node in nodes_of(section.items))
     calls = (node for node in nodes if isinstance(node, tree.Call) and is_call(node, "der"))
     return any(x.parts[0][0] == one.name for call in calls for x in references(call.arguments))
-
-
-def _flag(one: ClassMember, name: str) -> bool:
-    """Whether an annotation of a component says true."""
-    for said in one.element.declaration.annotation or ():
-        if isinstance(said, tree.Argument) and said.name == name and said.modification is not None:
-            return isinstance(value := said.modification.value, tree.BooleanLiteral) and value.value
-    return False
 
 
 def _attributes(one: ClassMember, said: Modifier, structure: Structure) -> dict[str, Any]:
@@ -219,9 +212,7 @@ def refuse_free(one: ClassMember) -> None:
 
 def inside_optimization(structure: Structure) -> bool:
     """Whether an instance is a component of an optimization, whose own inputs alone are known from outside."""
-    root = structure
-    while root.around is not None:
-        root = root.around
+    *_, root = structure.outward()
     return root is not structure and root.scope.definition.kind == "optimization"
 
 

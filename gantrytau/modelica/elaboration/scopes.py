@@ -7,20 +7,19 @@ from typing import NoReturn, cast
 
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
-from gantrytau.modelica.conditions import bound_pulses, is_call, with_pulses
-from gantrytau.modelica.elaboration import modifiers
+from gantrytau.modelica.conditions import bound_pulses, is_call, read_section
 from gantrytau.modelica.elaboration.modifiers import (
     Element,
     Modifier,
     StatementSection,
     merged,
     read_arguments,
+    read_constraint,
     read_modification,
 )
 from gantrytau.modelica.optimizations import HORIZON
+from gantrytau.modelica.parser import ELEMENT_SECTIONS
 from gantrytau.modelica.source import SourceText
-
-ELEMENT_SECTIONS = ("", "public", "protected")
 
 
 class TextError(ModelError):
@@ -154,7 +153,7 @@ class ClassScope:
         start = self.around if isinstance(self.definition.body, tree.ShortClass) and self.around else self
         base = start.find_class(name, at, inherited=False)
         limits = (self, self.limit) if isinstance(self.definition.body, tree.ShortClass) else ()
-        modifier = merged(read_arguments(arguments, start), modifiers.read_constraint(*limits))
+        modifier = merged(read_arguments(arguments, start), read_constraint(*limits))
         own = self.classes.items()
         anew = {n: x for n, x in own if "redeclare" in x.definition.prefixes or x.extends_its_name}
         found = base.redeclared(modifier).with_replaced({**anew, **self.replaced})
@@ -188,14 +187,10 @@ class ClassScope:
 
     def refuse_beyond(self, limit: "ClassScope", place: "ClassScope", at: int) -> None:
         """TextError where this class lacks a public component of the class that constrains what may replace it."""
-        public = (name for name, one in limit.elements.items() if not one.protected)
-        missing = next((name for name in public if name not in self.elements), None)
-        if missing is not None:
-            place.refuse(
-                at,
-                f"found {self.name} for what {limit.name} constrains, but it has no '{missing}', expected a class with all "
-                f"components of {limit.name}",
-            )
+        for name, one in limit.elements.items():
+            if not one.protected and name not in self.elements:
+                words = f"found {self.name} for what {limit.name} constrains, but it has no '{name}'"
+                place.refuse(at, f"{words}, expected a class with all components of {limit.name}")
 
     def check_replaced(self) -> None:
         """TextError for a redeclared class, here or in what it extends, that its constraint does not allow."""
@@ -223,7 +218,7 @@ class ClassScope:
                 if name in found and found[name].scope.definition.name != HORIZON:
                     self._check_same(found[name], element)
                 found[name] = replace(element, protected=True) if any(hidden[k : k + 1]) else element
-            self._check_names(base, modifier)
+            base.check_modified(modifier)
         for name, element in self.declared.items():
             old = found.get(name)
             if old is not None and "redeclare" in element.clause.prefixes:
@@ -245,13 +240,13 @@ class ClassScope:
         words = f"found '{name}' declared differently in {one.name} and in {other.name}"
         self.refuse(at, f"{words}, expected one declaration; rename one, or modify it where it is inherited")
 
-    def _check_names(self, base: "ClassScope", modifier: Modifier) -> None:
+    def check_modified(self, modifier: Modifier) -> None:
+        """TextError for a modification of what the class does not have."""
         for name, one in modifier.inner.items():
-            if name not in base.elements and one.redeclared is None and not base.is_primitive:
-                self.refuse(
-                    one.at,
-                    f"found '{name}' modified, which {base.name} does not have{did_you_mean(name, base.elements)}",
-                )
+            a_class = one.redeclared is not None and one.member_clause is None
+            if not (name in self.elements or a_class or one.scope is None or self.is_primitive):
+                hint = did_you_mean(name, self.elements)
+                one.scope.refuse(one.at, f"found '{name}' modified, which {self.name} lacks{hint}")
 
     @cached_property
     def is_primitive(self) -> bool:
@@ -271,8 +266,7 @@ class ClassScope:
         body = self.definition.body
         for one in body.sections if isinstance(body, tree.Composition) else ():
             if one.kind not in ELEMENT_SECTIONS:
-                items = tuple(with_pulses(i for i in one.items if not isinstance(i, tree.Element)))
-                found.append(StatementSection(one.kind, items, self))
+                found.append(StatementSection(*read_section(one), self))
         if pulses := tuple(bound_pulses(self.declared)):
             found.append(StatementSection("equation", pulses, self))
         return tuple(found)
@@ -330,8 +324,9 @@ class ClassScope:
 
     def imported_literal(self, name: str) -> "tuple[ClassScope, str] | None":
         """The enumeration and the name of its value that an import, here or further out, means by a name."""
-        found = ((one, inner) for one, inner, _ in self.imports(name) if inner in (one.literals or ()))
-        return next(found, None) or (self.around.imported_literal(name) if self.around else None)
+        return next(
+            ((one, inner) for one, inner in self._places(name) if inner in (one.literals or ())), None
+        )
 
     def _check_imports(self, name: str) -> None:
         """TextError where two imports of one kind, of single names or of all names, make different things of a name."""
@@ -365,15 +360,17 @@ class ClassScope:
 
     def constant(self, name: str) -> "tuple[ClassScope, Element] | None":
         """The component that a simple name means in a class around this one, and that class."""
+        known = ((one.heir or one, inner) for one, inner in self._places(name) if inner in one.elements)
+        return next(((one, one.elements[inner]) for one, inner in known), None)
+
+    def _places(self, name: str) -> Iterator[tuple["ClassScope", str]]:
+        """The classes in which a simple name may mean a constant, with its name there: here, by imports, further out."""
         here: ClassScope | None = self
         while here is not None:
             here._check_imports(name)
-            for owner, inner in ((here, name), *((one, inner) for one, inner, _ in here.imports(name))):
-                if inner in owner.elements:
-                    owner = owner.heir or owner
-                    return owner, owner.elements[inner]
+            yield here, name
+            yield from ((owner, inner) for owner, inner, _ in here.imports(name))
             here = here.around
-        return None
 
     def find_class(self, name: str, at: int, inherited: bool = True) -> "ClassScope":
         """The class that a name with dots means; ModelError with the line of an offset where there is none."""

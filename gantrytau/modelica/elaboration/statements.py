@@ -151,13 +151,14 @@ def pairs(a: Any, b: Any) -> Iterator[tuple[Any, Any]]:
         for one, other in zip(a.flat, b.flat, strict=True):
             yield from pairs(one, other)
         return
-    names, others = ([*one.names()] if hasattr(one, "member") else None for one in (a, b))
+    both: list[Any] = [a, b]
+    names, others = ([*one.names()] if hasattr(one, "member") else None for one in both)
     if (names is None) != (others is None) or not {*(names or ())} <= {*(others or ())}:
-        both = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
-        raise ModelError(f"found {both} beside '=', expected two of one type")
+        kinds = " and ".join(f"a record of {', '.join(x)}" if x else "no record" for x in (names, others))
+        raise ModelError(f"found {kinds} beside '=', expected two of one type")
     if names is not None:
         for name in names:
-            yield from pairs(a.member(name), b.member(name))
+            yield from pairs(*(one.member(name) for one in both))
         return
     if isinstance(a, np.ndarray) and not a.size:
         return

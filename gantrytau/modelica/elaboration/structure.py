@@ -3,6 +3,7 @@
 A parameter that is asked for here shapes the model: its value is folded, and another value makes another class.
 """
 
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,9 +14,16 @@ import numpy as np
 from gantrytau.border.refusal import ModelError, did_you_mean
 from gantrytau.modelica import tree
 from gantrytau.modelica.buses.expandable import expand
-from gantrytau.modelica.elaboration.interpreter import Interpreter, Surroundings
+from gantrytau.modelica.elaboration.interpreter import Interpreter
 from gantrytau.modelica.elaboration.kinds import fits, type_of_value
-from gantrytau.modelica.elaboration.modifiers import NOTHING, Element, Modifier, merged, read_arguments
+from gantrytau.modelica.elaboration.modifiers import (
+    NOTHING,
+    Element,
+    Modifier,
+    is_false,
+    merged,
+    read_arguments,
+)
 from gantrytau.modelica.elaboration.scopes import ClassScope, TextError
 from gantrytau.modelica.elaboration.values import EnumerationValue, in_rows, is_number
 from gantrytau.modelica.overdetermined.records import is_drawn
@@ -33,7 +41,7 @@ class Structure(Members):
 
     scope: ClassScope
     modifier: Modifier
-    beyond: Surroundings
+    library: Any
     path: str = ""
     prefixes: frozenset[str] = frozenset()  # parameter or constant, of the record as a whole
     around: "Structure | None" = None
@@ -45,11 +53,8 @@ class Structure(Members):
     @cached_property
     def members(self) -> dict[str, "ClassMember"]:
         """Its components by name, also those that are absent."""
+        self.scope.check_modified(self.modifier)
         for name, one in self.modifier.inner.items():
-            redeclares_class = one.redeclared is not None and one.member_clause is None
-            if name not in self.scope.elements and not redeclares_class and one.scope is not None:
-                hint = did_you_mean(name, self.scope.elements)
-                one.scope.refuse(one.at, f"found '{name}' modified, which {self.scope.name} lacks{hint}")
             element = self.scope.elements.get(name)
             if element is not None and element.protected and one.scope is not None:
                 words = f"found '{name}' modified, which is protected in {self.scope.name}, expected a public component"
@@ -68,14 +73,12 @@ class Structure(Members):
     @property
     def instance_name(self) -> str:
         """Its path behind the name of the whole model."""
-        root = self
-        while root.around is not None:
-            root = root.around
+        *_, root = self.outward()
         return f"{root.scope.definition.name}.{self.path}".rstrip(".")
 
     def interpreter(self, scope: ClassScope, members: Any = None) -> Interpreter:
         """What evaluates expressions of a class in this instance."""
-        return Interpreter(scope, members or self, self.beyond)
+        return Interpreter(scope, members or self, self.library)
 
     def folded(self, modifier: Modifier) -> Any:
         """The value of a modification."""
@@ -84,9 +87,11 @@ class Structure(Members):
             found = self.interpreter(modifier.scope, modifier.node).value(found)
         return modifier.picked(found)
 
-    def _refused(self, said: Modifier, words: str) -> ModelError:
-        """The error of a modification, with its line where it stands in a text."""
-        return TextError(said.scope.source.told(said.at, words)) if said.scope else ModelError(words)
+    def outward(self) -> "Iterator[Structure]":
+        """The instance, and those of which it is a component, up to the whole model."""
+        yield self
+        if self.around is not None:
+            yield from self.around.outward()
 
     def member(self, name: str) -> Any:
         """The value of a constant or parameter that shapes the model, or the structure of a component."""
@@ -114,7 +119,8 @@ class Structure(Members):
                 raise ModelError(f"found {found!r} for '{name}'{did_you_mean(literal, one.literals)}")
             return EnumerationValue(one.literals.index(literal) + 1, literal, one.primitive.name)
         if not fits(one.type_name, type_of_value(found)):
-            raise self._refused(one.full, f"found {found!r} for '{name}', expected {one.type_name}")
+            words, said = f"found {found!r} for '{name}', expected {one.type_name}", one.full
+            raise TextError(said.scope.source.told(said.at, words)) if said.scope else ModelError(words)
         if not is_number(found):
             raise ModelError(f"found the value of '{name}' to vary, expected one known at translation")
         if isinstance(found, (int, float)) and one.kind in ("Real", "Integer"):
@@ -158,13 +164,18 @@ class Structure(Members):
 
     def leaf(self, reference: tree.ComponentReference) -> "ClassMember | None":
         """The number, Boolean, text or choice to which a reference leads; None for all else."""
-        here: Structure | None = self
-        for k, (name, _) in enumerate(reference.parts, 1):
+        one = self.component(reference)
+        return one if one is not None and one.primitive is not None else None
+
+    def component(self, reference: tree.ComponentReference) -> "ClassMember | None":
+        """The component to which a reference leads, a number of a record for what stands behind it; None without one."""
+        one: ClassMember | None = None
+        for name, _ in reference.parts:
+            here = self if one is None else one.sample
             one = here.members.get(name) if here is not None else None
             if one is None or one.primitive is not None:
-                return one
-            here = one.sample if k < len(reference.parts) else None
-        return None
+                break
+        return one
 
 
 @dataclass(eq=False)
@@ -221,8 +232,7 @@ class ClassMember:
 
     def _begun(self, said: Modifier) -> Modifier:
         """The same with the value that an initial equation gives to a parameter with `fixed = false`."""
-        fixed = said.inner.get("fixed", self.over.inner.get("fixed"))
-        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
+        free = is_false(said.inner.get("fixed", self.over.inner.get("fixed")))
         for section in self.owner.scope.sections if free and "parameter" in self.prefixes else ():
             for item in section.items if section.kind == "initial equation" else ():
                 if isinstance(item, tree.SimpleEquation) and isinstance(item.left, tree.ComponentReference):
@@ -286,9 +296,11 @@ class ClassMember:
     @cached_property
     def is_solved(self) -> bool:
         """Whether it is a parameter whose value initial equations determine: `fixed = false`."""
-        fixed = self.full.inner.get("fixed")
-        free = fixed is not None and isinstance(fixed.value, tree.BooleanLiteral) and not fixed.value.value
-        return free and "parameter" in self.prefixes and self.full.value is None
+        return (
+            is_false(self.full.inner.get("fixed"))
+            and "parameter" in self.prefixes
+            and self.full.value is None
+        )
 
     @cached_property
     def follows(self) -> bool:
@@ -372,21 +384,16 @@ class ClassMember:
             scope.refuse(clause.at, f"found a component of {kind.name}, {words}")
         path = f"{self.owner.path}.{self.name}".lstrip(".")
         prefixes = frozenset({"parameter", "constant", "flow"} & self.prefixes)
-        around: Structure | None = self.owner
-        while around is not None and around.scope.definition is not kind.definition:
-            around = around.around
-        if around is not None:
+        if any(one.scope.definition is kind.definition for one in self.owner.outward()):
             scope.refuse(clause.at, f"found a component of {kind.name} in itself, expected another class")
         return [
-            Structure(kind, one, self.owner.beyond, path, prefixes, self.owner)
+            Structure(kind, one, self.owner.library, path, prefixes, self.owner)
             for one in self.full.of_elements(self.shape)
         ]
 
     def _inner(self) -> "ClassMember | None":
         """The component that an `outer` means."""
-        around = self.owner.around if "outer" in self.prefixes and "inner" not in self.prefixes else None
-        while around is not None:
-            if around.has(self.name) and "inner" in around.members[self.name].prefixes:
-                return around.members[self.name]
-            around = around.around
-        return None
+        if self.owner.around is None or "outer" not in self.prefixes or "inner" in self.prefixes:
+            return None
+        known = (one.members[self.name] for one in self.owner.around.outward() if one.has(self.name))
+        return next((one for one in known if "inner" in one.prefixes), None)

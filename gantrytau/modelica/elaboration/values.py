@@ -115,14 +115,9 @@ def _same_shape(sign: str, a: Any, b: Any) -> None:
 
 
 def size_words(value: Any) -> str:
-    """The size of a value as Modelica writes it."""
+    """The sizes of a value as Modelica writes them, or "a scalar"."""
     shape = all_sizes(value)
-    return f"[{', '.join(map(str, shape))}]" if shape else "of a scalar"
-
-
-def sized(value: Any) -> str:
-    """The same, as a noun."""
-    return size_words(value).removeprefix("of ")
+    return f"[{', '.join(map(str, shape))}]" if shape else "a scalar"
 
 
 def _spread(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -158,9 +153,7 @@ def _power(a: Any, b: Any) -> Any:
     if not (isinstance(a, np.ndarray) or isinstance(b, np.ndarray)):
         return a**b
     if len({*all_sizes(a)}) != 1 or np.ndim(a) != 2 or not isinstance(b, int) or b < 0:
-        words = (
-            f"found {sized(a)} and {sized(b)} beside '^', expected a square matrix and a known Integer from 0"
-        )
+        words = f"found {size_words(a)} and {size_words(b)} beside '^', expected a square matrix and a known Integer from 0"
         raise ModelError(f"{words}; '.^' takes the power of each element")
     return reduce(_product, [a] * b, np.eye(len(a), dtype=object))
 

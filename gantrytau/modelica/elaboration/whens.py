@@ -105,6 +105,9 @@ def _happenings(
 
 def _stays(test: tree.Expression, reader: Interpreter) -> Any:
     """A condition; of Integers, Booleans or literals that are equal or differ as a range, in which they stay for a while."""
+    if isinstance(test, tree.Binary) and test.operator in ("and", "or"):
+        left, decisive = _stays(test.left, reader), test.operator == "or"
+        return left if left is decisive else values.binary(test.operator, left, _stays(test.right, reader))
     found = reader.value(test)
     if not (isinstance(test, tree.Binary) and test.operator in ("==", "<>") and isinstance(found, ca.SX)):
         return found

@@ -21,9 +21,14 @@ def _bits(pair: Sequence[Any]) -> Bits:
     found: Bits = []
     for half in pair:
         rest = half - 2.0**32 * ca.floor(half / 2.0**32)  # without sign
-        below = [ca.floor(rest / 2.0**k) for k in range(33)]
-        found += [one - 2 * further for one, further in pairwise(below)]
+        found += _lowest(rest, 32)
     return found
+
+
+def _lowest(number: Any, count: int) -> Bits:
+    """The lowest bits of a whole number."""
+    halved = [ca.floor(number / 2.0**k) for k in range(count + 1)]
+    return [one - 2 * further for one, further in pairwise(halved)]
 
 
 def _number(bits: Sequence[Any]) -> Any:
@@ -55,13 +60,8 @@ def _carried(columns: Sequence[Any]) -> Bits:
     for column in columns:
         whole = column + carry
         carry = ca.floor(whole / 2.0**DIGIT)
-        below = [ca.floor((whole - 2.0**DIGIT * carry) / 2.0**k) for k in range(DIGIT + 1)]
-        found += [one - 2 * further for one, further in pairwise(below)]
+        found += _lowest(whole - 2.0**DIGIT * carry, DIGIT)
     return found
-
-
-def _plus(a: Bits, b: Bits) -> Bits:
-    return _carried([x + y for x, y in zip(_digits(a), _digits(b), strict=True)])
 
 
 def _times(a: Bits, factor: int) -> Bits:
@@ -88,7 +88,7 @@ def _xorshift128(state: Any) -> tuple[Any, Any]:
     s1, s0 = _bits(state[:2]), _bits(state[2:])
     s1 = _xor(s1, _moved(s1, 23))
     mixed = reduce(_xor, (s1, s0, _moved(s1, -17), _moved(s0, -26)))
-    mixed = _plus(mixed, s0)
+    mixed = _carried([x + y for x, y in zip(_digits(mixed), _digits(s0), strict=True)])
     return _state([*state[2:], *_pair(mixed)]), _value(_fraction(mixed))
 
 

@@ -16,26 +16,37 @@ from gantrytau.modelica.references import references
 
 
 def most_rounds(item: tree.WhileLoop, reader: Interpreter) -> int | None:
-    """The number n of `while i < n and ...` with the subscript i, at least 1, that rises by 1; None for another loop."""
-    left, found = [item.condition], None
+    """The most rounds of `while i < n and ...` or `while x > a[i + 1]`, i at least 1 and rising by 1; None for another loop.
+
+    The first i is a subscript; behind the last element of the second a there is no number, which ends the loop.
+    """
+    steps = [i for i in item.items if isinstance(i, tree.Assignment) and isinstance(i.value, tree.Binary)]
+    values_of = [(i.targets, cast(tree.Binary, i.value)) for i in steps]
+    rising = [
+        v.left for t, v in values_of if t == (v.left,) and (v.operator, v.right) == ("+", tree.Number(0, "1"))
+    ]
     every = [s for node in references([item.condition, item.items]) for _, s in node.parts]
-    subscripts = [one.parts for one in references(every)]
+    left, found = [item.condition], []
     for test in left:
         if isinstance(test, tree.Binary) and test.operator == "and":
             left += [test.left, test.right]
-        elif isinstance(test, tree.Binary) and test.operator in ("<", "<="):
+        elif isinstance(test, tree.Binary) and test.operator in ("<", "<=") and test.left in rising:
             limit = reader.value(test.right)
-            rises = any(
-                isinstance(one, tree.Assignment)
-                and one.targets == (test.left,)
-                and isinstance(one.value, tree.Binary)
-                and (one.value.operator, one.value.left) == ("+", test.left)
-                and one.value.right == tree.Number(0, "1")
-                for one in item.items
+            subscripts = [node.parts for node in references(every)]
+            known = values.is_number(limit) and cast(tree.ComponentReference, test.left).parts in subscripts
+            found += [int(limit)] if known else []
+    for node in references(item.condition):
+        name, places = node.parts[-1]
+        for axis, place in enumerate(places):
+            shifted = (
+                isinstance(place, tree.Binary)
+                and place.operator == "+"
+                and isinstance(place.right, tree.Number)
             )
-            parts = cast(tree.ComponentReference, test.left).parts if rises else ()
-            found = int(limit) if parts in subscripts and values.is_number(limit) else found
-    return found
+            if (cast(tree.Binary, place).left if shifted else place) in rising:
+                whole = replace(node, parts=(*node.parts[:-1], (name, ())))
+                found.append(values.all_sizes(reader.value(whole))[axis])
+    return min(found, default=None)
 
 
 def with_part(old: Any, parts: Sequence[Any], new: Any, reader: Interpreter) -> Any:

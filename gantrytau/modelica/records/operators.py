@@ -41,7 +41,7 @@ def operated(sign: str, operands: Sequence[Any], call: Call) -> Any:
 
 def called(name: str, arguments: Sequence[Any], named: Mapping[str, Any], call: Call) -> Any:
     """The value of a function of the language; sum and product of operator records by their operators."""
-    items = np.ravel(arguments[0]) if name in SIGNS and len(arguments) == 1 else ()
+    items: Any = np.ravel(arguments[0]) if name in SIGNS and len(arguments) == 1 else ()
     if len(items) and operator_record(items[0]) is not None:
         return reduce(lambda a, b: overloaded(SIGNS[name], [a, b], call), items)
     return values.called(name, arguments, named)

@@ -14,7 +14,7 @@ MANY = tuple(2**n for n in range(11, 40))  # turns, after which is asked whether
 HALVES = 5
 SHRINKING = 0.42  # of an interval between turns to that after half as many turns; 1 / k gives 1 / 2
 CROWD = 8  # turns of a switch within a short time, after which its margin may be nothing but rounding
-CLOSE = 1e-3  # of a run: a short time
+CLOSE = 0.05  # of a run: a short time
 HOPS = 3  # of a when, one after another
 HOP = 1000  # times rounding: a margin that stays nearer to zero turns by rounding
 

@@ -30,8 +30,8 @@ def controller_code(
     limits: tuple[int, int, float],
     estimates: Mapping[str, float],
 ) -> SampledCode:
-    """C of an Mpc. soft (rows,): which limits give way; first: plan, NaN for measured states; limits: most iterations of the
-    first plan and of a step, and changes by which they are done; estimates: name -> value until one is given.
+    """C of an Mpc. soft (rows,): which slack a limit has, -1 for none; first: plan, NaN for measured states; limits: most
+    iterations of the first plan and of a step, and changes by which they are done; estimates: by name until one is given.
 
     ModelError for courses, which are functions of Python, and for a steady state that moves.
     """
@@ -46,7 +46,7 @@ def controller_code(
     rows = _rows(mpc, soft)
     sizes = dict(
         PERIOD=mpc.period, N=mpc.elements, NX=stages.nx, NZ=stages.nz, NU=stages.nu, NC=stages.costly.size, NK=len(known),
-        NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.any()),
+        NL=len(stages.path), NI=len(rows), MOVES=int(mpc.moves.wanted), SLACK=int(soft.max(initial=-1)) + 1,
         END=int(mpc.terminal.there), DELAY=mpc.delay, PENALTY=float(penalty), RIDGE=RIDGE,
         TURNS=TURNS, APART=APART, CLOSE=CLOSE, GOOD=GOOD, KEPT=KEPT, YIELD=YIELD,
         FIRST=limits[0], ITERATIONS=limits[1], STANDS=limits[2],
@@ -102,17 +102,18 @@ def _rows(mpc: Any, soft: np.ndarray) -> list[str]:
     stages, moves, found = mpc.stages, mpc.moves, []
     paths = len(stages.path)
     for k, ends in enumerate(zip(*stages.rows, strict=True)):
-        found += _ends("MPC_PATH", k // paths, k % paths, ends, bool(soft[k]))
+        found += _ends("MPC_PATH", k // paths, k % paths, ends, int(soft[k]))
     for k, ends in enumerate(zip(stages.lower_u, stages.upper_u, strict=True)):
-        found += _ends("MPC_INPUT", 0, k, ends, False)
+        found += _ends("MPC_INPUT", 0, k, ends)
     for k in moves.limited:
-        found += _ends("MPC_MOVE", 0, k, (moves.lower[k], moves.upper[k]), False)
-    return [*found, *(["{MPC_SLACKNESS, 0, 0, -1, 0, 0.0}"] if soft.any() else [])]
+        found += _ends("MPC_MOVE", 0, k, (moves.lower[k], moves.upper[k]))
+    slacks = int(soft.max(initial=-1)) + 1
+    return [*found, *(f"{{MPC_SLACKNESS, 0, {k}, -1, 0, 0.0}}" for k in range(slacks))]
 
 
-def _ends(kind: str, point: int, index: int, ends: tuple[float, float], soft: bool) -> list[str]:
+def _ends(kind: str, point: int, index: int, ends: tuple[float, float], soft: int = -1) -> list[str]:
     return [
-        f"{{{kind}, {point}, {index}, {sign}, {int(soft)}, {float(end)!r}}}"
+        f"{{{kind}, {point}, {index}, {sign}, {soft + 1}, {float(end)!r}}}"
         for sign, end in zip((-1, 1), ends, strict=True)
         if np.isfinite(end)
     ]

@@ -43,8 +43,9 @@ double horizon_load(controller_state *it, double t) {
 
 double horizon_change(controller_state *it, const double *x, double *slack) {
     const double change = mpc_change(it, x);
-    int k;
-    for (k = 0; k < MPC_N; k++) slack[k] = MPC_SLACK ? it->work.stages[k].v[MPC_NE - 1] : 0;
+    int i, k;
+    for (k = 0; k < MPC_N; k++)
+        for (slack[k] = 0, i = MPC_NQ + MPC_NU; i < MPC_NE; i++) slack[k] = fmax(slack[k], it->work.stages[k].v[i]);
     return change;
 }
 """
@@ -81,7 +82,7 @@ class CompiledHorizon:
 
     def changed(self, plan: PlannedMotion, first: np.ndarray) -> tuple[PlannedMotion, float, np.ndarray]:
         """The loaded plan changed by its program's solution from a first state (nx,); its largest change, below 0 without
-        a solution, and slacks (N,).
+        a solution, and the largest slacks (N,).
         """
         self._state[:] = first
         change = self._change(*self._at)

@@ -199,11 +199,11 @@ static int mpc_linearise(const double *x, const double *w, const double *u, doub
 
 /* ---- The program of the horizon: see horizon_qp.py, and moves.py for what is added to its stages. */
 
-/* A row of the limits of a stage: sign * (row of T, or input) <= bound, softened or not. */
+/* A row of the limits of a stage: sign * (row of T, or input) <= bound, softened or not (soft: its slack from 1, or 0). */
 static void mpc_limit(mpc_stage *s, int i, const mpc_row *row, const double *line, double value) {
     int j;
     FOR(j, NE) s->G[i][j] = row->sign * line[j];
-    if (MPC_SLACK && row->soft) s->G[i][NE - 1] = -1;
+    if (row->soft) s->G[i][NQ + NU + row->soft - 1] = -1;
     s->q[i] = row->sign * (row->bound - value);
 }
 
@@ -268,7 +268,7 @@ static void mpc_assemble(mpc_stage *s, int k, mpc_linear *linear, const double *
             if (chosen) line[NQ + row->index] = 1, line[NX + row->index] = -1;
             value = chosen ? -o[row->index] : row->bound - row->sign;
         } else {
-            line[NE - 1] = 1;
+            line[NQ + NU + row->index] = 1;
         }
         mpc_limit(s, i, row, line, value);
     }
@@ -280,7 +280,7 @@ static int mpc_factor(mpc_stage *s, const double P[NQ][NQ], double ridge) {
     int i, j, k;
     memcpy(F, s->H, sizeof F);
     FOR(i, NE) F[i][i] += ridge;
-    if (MPC_SLACK) F[NE - 1][NE - 1] = s->penalty;
+    for (i = NQ + NU; i < NE; i++) F[i][i] = s->penalty;
     FOR(k, NI) {
         const double D = 1 / (s->s[k] / s->lambda[k] + MPC_YIELD);
         FOR(i, NE) FOR(j, NE) F[i][j] += D * s->G[k][i] * s->G[k][j];
@@ -315,7 +315,7 @@ static void mpc_direction(mpc_work *work, const double *first) {
         mpc_stage *s = &work->stages[n];
         double f[NE], Pb[NQ];
         memcpy(f, s->g, sizeof f);
-        if (MPC_SLACK) f[NE - 1] = s->penalty;
+        for (i = NQ + NU; i < NE; i++) f[i] = s->penalty;
         FOR(k, NI) {
             const double D = 1 / (s->s[k] / s->lambda[k] + MPC_YIELD);
             const double force = s->lambda[k] + D * (s->aim[k] / s->lambda[k] - s->q[k]);

@@ -22,7 +22,7 @@ OPTIONS = {
 
 
 class FirstPlan:
-    """The program of a horizon of N stages. soft (rows,): limits that give way, by this penalty."""
+    """The program of a horizon of N stages. soft (rows,): which slack a limit has, -1 for none; penalty: of slacks."""
 
     def __init__(
         self,
@@ -35,9 +35,9 @@ class FirstPlan:
     ):
         self.stages, self.elements = stages, elements
         n, nx, nu, each = elements, stages.nx, stages.nu, stages.nx + stages.nz
-        x, w, u, e = (
-            ca.MX.sym(*one) for one in (("x", nx, n + 1), ("w", stages.nw, n), ("u", nu, n), ("e", 1, n))
-        )
+        self._slacks = int(soft.max(initial=-1)) + 1
+        shapes = (("x", nx, n + 1), ("w", stages.nw, n), ("u", nu, n), ("e", self._slacks, n))
+        x, w, u, e = (ca.MX.sym(*one) for one in shapes)
         courses = len(stages.phase.courses)
         sizes = ((nx, 1), (2, n), (2 * courses, n), (nu, 1), (nx, nx), (nx, 1))
         given = [ca.MX.sym(f"given_{k}", *size) for k, size in enumerate(sizes)]
@@ -56,13 +56,13 @@ class FirstPlan:
                 ca.vec(found[i][0][nx:, :]),
             ]
         rows = ca.vertcat(found[0][2], found[1][2])
-        slack = ca.DM(soft.astype(float)) @ e
+        slack = ca.DM((soft[:, None] == np.arange(self._slacks)).astype(float)) @ e
         limits = [ca.vec(rows + slack), ca.vec(rows - slack)]
         lower, upper = (np.tile(end, n) for end in stages.rows)
         step = u - ca.horzcat(before, u[:, :-1])
         chosen = np.tile(moves.chosen, (nu, 1))
         cost += ca.sum1(ca.sum2(chosen * moves.weights[:, None] * step**2))
-        cost += penalty * ca.sum2(e + e**2 / 2)
+        cost += penalty * ca.sum1(ca.vec(e + e**2 / 2))
         cost += ca.mtimes([(x[:, -1] - rest).T, P, x[:, -1] - rest]) / 2
         if terminal.there:
             cost += terminal.cost(*(part[:, -1] for part in parts[1]))
@@ -73,8 +73,8 @@ class FirstPlan:
         self._lower = np.concatenate([zeros, lower, -endless, low])
         self._upper = np.concatenate([zeros, endless, upper, high])
         free = np.full(x.numel() + w.numel(), np.inf)
-        self._low = np.concatenate([-free, np.tile(stages.lower_u, n), np.zeros(n)])
-        self._high = np.concatenate([free, np.tile(stages.upper_u, n), np.full(n, np.inf)])
+        self._low = np.concatenate([-free, np.tile(stages.lower_u, n), np.zeros(e.numel())])
+        self._high = np.concatenate([free, np.tile(stages.upper_u, n), np.full(e.numel(), np.inf)])
         program = {
             "x": ca.veccat(x, w, u, e), "p": ca.veccat(*given), "f": cost,
             "g": ca.vertcat(*equal, *limits, ca.vec(step)),
@@ -82,7 +82,7 @@ class FirstPlan:
         self._solver: Any = ca.nlpsol("first_plan", "ipopt", program, OPTIONS)
 
     def solved(self, plan: PlannedMotion, x: np.ndarray, before: np.ndarray, P: np.ndarray, rest: np.ndarray):
-        """The plan from a state (nx,), from a guess on, its slacks (N,), and whether it is one.
+        """The plan from a state (nx,), from a guess on, its largest slacks (N,), and whether it is one.
 
         before: inputs applied now; P, rest: cost of a distance from a state at the end.
         """
@@ -92,7 +92,7 @@ class FirstPlan:
         start = np.concatenate([part.ravel() for part in (plan.x, plan.w, plan.u)])
         given = np.concatenate([part.ravel("F") for part in (x, t, known, before, P, rest)])
         found = self._solver(
-            x0=np.append(start, np.zeros(n)),
+            x0=np.append(start, np.zeros(self._slacks * n)),
             p=given,
             lbx=self._low,
             ubx=self._high,
@@ -104,4 +104,5 @@ class FirstPlan:
         made = PlannedMotion(
             xs.reshape(plan.x.shape), w.reshape(plan.w.shape), u.reshape(plan.u.shape), plan.t
         )
+        slack = slack.reshape(n, self._slacks).max(axis=1, initial=0.0)
         return made, slack, bool(self._solver.stats()["success"])

@@ -22,7 +22,7 @@ AWAY = 10.0  # times the least change: there iterations lead away again
 @dataclass(frozen=True, eq=False)
 class Iterated:
     """A plan after some iterations, whether its programs were solved, or had no bound, the last change of inputs and states,
-    and the slack of soft limits (N,).
+    and the largest slack of soft limits (N,).
     """
 
     plan: PlannedMotion
@@ -58,8 +58,8 @@ def failed(plan: PlannedMotion, unbounded: bool = False) -> Iterated:
 class GaussNewton:
     """Iterations for the plans of a horizon of so many stages; its program is the one that `load` has loaded last.
 
-    soft (rows,): which limits of a stage give way, by this penalty. applied (nu,): the inputs applied now, scaled; code: the
-    same in machine code, which solves its programs by another method.
+    soft (rows,): which slack a limit of a stage has, -1 for none; penalty: of slacks. applied (nu,): the inputs applied now,
+    scaled; code: the same in machine code, which solves its programs by another method.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class GaussNewton:
         nx = stages.nx + (stages.nu if moves.wanted else 0)
         limits = np.isfinite([moves.lower, moves.upper])[:, moves.limited]
         finite = np.hstack([np.isfinite(stages.rows), limits])
-        rows = np.append(soft, limits[0] & False)
+        rows = np.append(soft, np.full(limits.shape[1], -1))
         self._program = HorizonProgram(elements, nx, stages.nu, rows, finite, penalty, size=stages.curvature)
 
     def reset(self) -> None:

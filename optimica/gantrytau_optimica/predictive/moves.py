@@ -7,7 +7,7 @@ applied last. Where an input is held, u = v leaves no choice; all changes are to
     low <= u - v - o <= high,  cost weight (u - v - o)^2                     chosen anew
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from gantrytau import ModelError
 from gantrytau.border.checks import array, instance, number, whole
+from gantrytau.border.dimensions import per_second
 from gantrytau.border.refusal import Given, did_you_mean
 from gantrytau_optimica.predictive.horizon_qp import Found, Stage
 from gantrytau_optimica.predictive.stages import HorizonStages
@@ -25,6 +26,7 @@ class Moves:
 
     rates: input -> largest rate or (lowest, highest), unit/s; penalties: input -> weight of the square of a step.
     blocks: periods for which inputs are held, one number or one for each block, the last one to the end of the horizon.
+    unit: of an input, by name.
     """
 
     def __init__(
@@ -34,12 +36,15 @@ class Moves:
         rates: Mapping[str, Any],
         penalties: Mapping[str, float],
         blocks: int | Sequence[int],
+        unit: Callable[[str], str | None],
     ):
         self.nx, self.nu = stages.nx, stages.nu
         names = tuple(s.name for s in stages.phase.inputs)
         self.lower, self.upper = np.full(self.nu, -np.inf), np.full(self.nu, np.inf)
         for name, found in _of_inputs(stages, "rates", rates, names).items():
-            self.lower[names.index(name)], self.upper[names.index(name)] = _rate(name, found)
+            self.lower[names.index(name)], self.upper[names.index(name)] = _rate(
+                name, found, per_second(unit(name) or "")
+            )
         self.lower, self.upper = (ends * stages.step / stages.sizes_u for ends in (self.lower, self.upper))
         weights = np.zeros(self.nu)
         for name, found in _of_inputs(stages, "step_penalty", penalties, names).items():
@@ -101,12 +106,12 @@ def _of_inputs(stages: HorizonStages, argument: str, found: Any, names: Sequence
     return dict(found)
 
 
-def _rate(name: str, found: Any) -> tuple[float, float]:
+def _rate(name: str, found: Any, unit: str) -> tuple[float, float]:
     """Lowest and highest rate, with 0 between them: an input must be allowed to stay."""
     if np.ndim(found) == 0 and found is not None:
-        most = number("Mpc", f"rates[{name}]", found, above=0.0)
+        most = number("Mpc", f"rates[{name}]", found, unit=unit or None, above=0.0)
         return -most, most
-    low, high = array("Mpc", f"rates[{name}]", found, (2,), finite=False)
+    low, high = array("Mpc", f"rates[{name}]", found, (2,), unit=unit or None, finite=False)
     if not low <= 0.0 <= high or low == high:
         raise ModelError(
             "expected the lowest and the highest rate in unit/s, with 0 between them, as (-10.0, 5.0)",

@@ -106,7 +106,9 @@ class Mpc:
         checks.doubt_samples(self.built, self.period)
         self._yielding = soft = self._soft(hard)
         weight = PENALTY * self.stages.curvature if penalty is None else penalty
-        self.moves = moves = Moves(self.stages, self.elements, rates or {}, step_penalty or {}, blocks)
+        self.moves = moves = Moves(
+            self.stages, self.elements, rates or {}, step_penalty or {}, blocks, self.built.read.dae.flat.unit
+        )
         self.steady = SteadyState(self.stages) if terminal == "lqr" else None
         self._newton = GaussNewton(self.stages, self.elements, soft, weight, moves, self.steady)
         self.terminal, self._penalty = self._newton.terminal, weight
@@ -255,7 +257,7 @@ class Mpc:
         value, by default the model's start; noise: state -> standard deviation of its measurement, in its unit. estimator:
         a MovingHorizon or an ExtendedKalman, which begins anew; then what it names as measured is all that is, with noise by
         these names.
-        after: a loop with the same model, without estimator, to go on from where it ended, as if it had never ended.
+        after: a loop with the same model and estimator, to go on from where it ended, as if it had never ended.
         """
         sensors = Sensors(self, noise or {}, seed, estimator)
         self.recall(None)
@@ -295,10 +297,10 @@ class Mpc:
         """What a loop must have in common with this controller to go on with it."""
         return self.states, self.inputs, self.period, self.elements, self.delay
 
-    def resume(self, plan: PlannedMotion, applied: Mapping[str, float], times: StepTimes) -> None:
-        """Be as after the step that made a plan, with these inputs held."""
-        self._plan, self._prepared = plan, None
-        self._newton.applied = np.array([applied[name] for name in self.inputs]) / self.stages.sizes_u
+    def resume(self, memory: Any, times: StepTimes) -> None:
+        """Be as after the steps that left this memory."""
+        self.recall(memory)
+        self.prepare()
         self._preparations, self._steps = list(times.preparation), list(times.step)
         self._missed = times.missed
 
@@ -370,16 +372,17 @@ class Mpc:
         return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
-        """Which rows of a stage are soft."""
+        """Which slack a row of a stage has, that of its limit, or -1: it is hard."""
         names = self.stages.row_names
         if isinstance(hard, str):
             one_of("Mpc", "hard", hard, ("none", "all"))
-            return np.full(len(names), hard == "none")
+            hard = names if hard == "all" else ()
         unknown = [name for name in hard if name not in names]
         if unknown:
             words = f"expected some of {', '.join(dict.fromkeys(names)) or 'no limit'}{did_you_mean(unknown[0], names)}"
             raise ModelError(words, place=self.name, found=Given("hard", unknown[0]))
-        return np.array([name not in hard for name in names], dtype=bool)
+        soft = np.array([name not in hard for name in names[: len(names) // 2]], dtype=bool)
+        return np.tile(np.where(soft, np.cumsum(soft) - 1, -1), 2)
 
     def _passed(self, slack: np.ndarray, plan: PlannedMotion) -> tuple[str, ...]:
         """Words of the soft limits that the plan passes; others may only touch, by linearisation beyond them a little."""

@@ -84,7 +84,7 @@ def named_values(
     finite: bool = True,
     alike: bool = False,
 ) -> dict[str, float]:
-    """Values by scalar name of a mapping from names, vectors whole or by element; `names` are those allowed.
+    """Values by scalar name of a mapping from names, vectors whole or by element; `names` are allowed, texts have units.
 
     alike: one number may stand for all elements of a vector. Raises ModelError for other names and shapes.
     """
@@ -101,7 +101,7 @@ def named_values(
         shapes = ([(len(elements),)] if len(elements) > 1 else []) + (
             [()] if alike or len(elements) == 1 else []
         )
-        values = array(place, name, value, *shapes, finite=finite)
+        values = array(place, name, value, *shapes, unit=flat.unit(name), finite=finite)
         found.update(zip(elements, np.broadcast_to(values, len(elements)).tolist(), strict=True))
     return found
 

@@ -71,7 +71,7 @@ class TextOptimization(ModelicaModel, Optimization):
         return value
 
     def _reader(self, scope: ClassScope) -> TimedInterpreter:
-        return TimedInterpreter(scope, PlacedMembers(self), type(self).structure.beyond)
+        return TimedInterpreter(scope, PlacedMembers(self), type(self).structure.library)
 
 
 def _kind(value: Any) -> str:

@@ -93,26 +93,11 @@ def test_what_is_wrong_is_told_in_options(cell):
         (["stream", cell / "missing.csv", "--port", 9], "found no file to read"),
         (["stream", cell / "none.csv", "--port", 9], "furlong"),
         (["stream", cell / "u.csv", "--port", 9, "--tcp"], "found nobody there"),
-        (["stream", cell / "u.csv", "--port", 70000], "'--port': expected at most 65535"),
-        (["stream", cell / "u.csv", "--port", -1, "--tcp"], "'--port': expected at least 1"),
-        (["stream", cell / "u.csv", "--port", 9, "--host", "x" * 70], "found nobody there"),
         (
             ["stream", cell / "u.csv", "--port", 9, "--token", "two\tparts"],
             "expected a text that can be printed",
         ),
-        (["panel", "--port", 70000], "'--port': expected at most 65535"),
-        (
-            ["run", cell / "cell.toml", "--stop", 1, "--port", 70000],
-            "expected a whole number of at least 0 and of at most 65535",
-        ),
-        (
-            ["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", "nan"],
-            "expected a number of at least 0 in s",
-        ),
-        (
-            ["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", 0.1],
-            "stream did not come within 0.1 s",
-        ),
+        (["run", cell / "cell.toml", "--stop", 1, "--port", 0, "--wait", 0.1], "did not come within 0.1 s"),
     ):
         answer = asked(*arguments)
         assert answer.exit_code != 0
@@ -147,19 +132,3 @@ def test_without_waiting_it_runs_at_once(cell):
     answer = asked("run", cell / "cell.toml", "--stop", 0.1, "--port", 0, "--wait", 0)
     assert answer.exit_code == 0, answer.output
     assert "26 samples of 0.004 s" in answer.output
-
-
-@pytest.mark.parametrize(
-    ("places", "words"),
-    [
-        ("[places]\nstream = 3\n", "places.stream: found 3, expected a table"),
-        ("[places.stream]\ndelta = 1.0\n", "places.stream.delta: found 1.0, expected a table"),
-        ("[places.stream]\ndelta = { unut = 'm' }\n", "places.stream.delta.unut: there is no such key"),
-        ("[places.stream]\ndelta = { unit = 'mm' }\n", "'mm' is not a coherent SI unit"),
-    ],
-)
-def test_wrong_places_are_told_with_their_key(cell, places, words):
-    (cell / "cell.toml").write_text(FILE[: FILE.index("[places")] + places)
-    answer = asked("run", cell / "cell.toml", "--stop", 1)
-    assert answer.exit_code != 0
-    assert words in " ".join(answer.output.split()), answer.output

@@ -68,13 +68,3 @@ def test_what_is_wrong_with_a_log_is_told_with_its_file(run, log, tmp_path):
 def test_wrong_options_are_refused(run, file, arguments, words, code):
     answer = run("identify", file, "--robot", "GantryTau(L1)", *arguments)
     assert (answer.exit_code, words in answer.output) == (code, True), answer.output
-
-
-def test_logs_that_are_none_are_refused(run, log, tmp_path):
-    answer = run("identify", tmp_path / "absent.csv", *ROBOT)
-    assert answer.exit_code == 2
-    assert "found no file to read" in answer.output
-    two = MotionLog(log.t, log.q[:, :2], log.f[:, :2]).save(tmp_path / "two.csv")
-    answer = run("identify", two, *ROBOT, "--json")
-    assert answer.exit_code == 1
-    assert "found 2 actuators, expected the 3 of GantryTau" in json.loads(answer.stdout)["error"]

@@ -79,15 +79,9 @@ def test_images_become_corners_and_a_page(run, tmp_path, monkeypatch):
     [
         (("vision", "detect", "nowhere", "--side", "0.06"), "nowhere: there is no such folder"),
         (("vision", "detect", ".", "--side", "60"), "a number above 0 and of at most 1"),
-        (RECONSTRUCT[:5], "found 1 cameras and images of 2, expected one lens for each"),
-        ((*RECONSTRUCT, "--scale", "both"), "both"),
         ((*RECONSTRUCT, "--place", "1,2"), "--place 1,2: found no three numbers"),
         ((*RECONSTRUCT, "--carts", "lens.toml"), "lens.toml: line 2 has 5 cells"),
-        ((*RECONSTRUCT, "--carts", "nothing.csv"), "nothing.csv: found no file to read"),
-        (("vision", "reconstruct", "laser.csv", "--camera", "lens.toml"), "found no corners of images"),
-        (("vision", "compare", "laser.csv", "carts.csv"), "carts.csv: found no column 'x'"),
         (("vision", "compare", "laser.csv", "few.csv"), "few.csv: found 2 rows, expected 72 as in laser.csv"),
-        (("vision", "compare", "laser.csv", "other.csv"), "found none of the numbers of laser.csv"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_place(run, files, words, told):

@@ -217,9 +217,7 @@ def test_inputs_of_a_model_that_nothing_gives_are_told(wires, said):
 
 def test_a_model_whose_outputs_are_no_references_is_refused(plant):
     part = PythonComponent(lambda t, v: {"f": 0.0}, inputs=[], outputs=[Channel("f", "N")])
-    with pytest.raises(
-        ModelError, match="found the outputs f, expected one that is a reference, q_ref; wires"
-    ):
+    with pytest.raises(ModelError, match="found the outputs f, expected one that is a reference, q_ref"):
         Controller(plant, part)
 
 

@@ -108,9 +108,7 @@ def test_the_page_names_the_version_of_the_tool_and_what_is_marked():
     page = Page(documentation(oscillator()))
     assert page.row("Made with")[1] == f"gantrytau {version('gantrytau')}, 2026-01-02T03:04:05Z"
     assert page.row("spring.c")[4].endswith("set before the start")
-    assert (
-        "all but those that are marked “set before the start” may be changed at any time later" in page.words
-    )
+    assert "all but those that are marked “set before the start” may be changed at any time" in page.words
     other = Page(documentation(oscillator(tool="no such tool")))
     assert other.row("Made with")[1] == "no such tool, 2026-01-02T03:04:05Z"
 

@@ -189,9 +189,7 @@ def test_a_parameter_is_given_over_the_line_and_limits_are_exact():
 
 
 def test_what_is_not_one_sampled_step_is_told():
-    with pytest.raises(
-        ModelError, match=r"found periods=\[0.01, 0.03\], expected one; make a model for each"
-    ):
+    with pytest.raises(ModelError, match=r"found periods=\[0.01, 0.03\], expected one; make a model for"):
         step_code(TwoRates(), given=["r", "m"], find=["y"])
     with pytest.raises(ModelError, match=r"find=.*expected at least one name"):
         step_code(Proportional(), given=["r", "m"], find=[])

@@ -38,7 +38,5 @@ def test_an_fmu_changes_its_modes_as_simulate_does(which, fmi, tmp_path):
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_two_guards_at_once_are_an_error_of_the_fmu(fmi, tmp_path):
     file = export_fmu(Fork(), tmp_path / "fork.fmu", fmi=fmi)
-    with pytest.raises(
-        SolveError, match=r"at time = 0\.5 s two transitions of mode out of way may act at once, to west"
-    ):
+    with pytest.raises(SolveError, match=r"at time = 0\.5 s two transitions of mode out of way may act at"):
         run_fmu(file, stop=1.0, step=0.1)

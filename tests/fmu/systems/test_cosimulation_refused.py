@@ -72,10 +72,7 @@ def test_wrong_settings_are_refused(halves, policy, argument, words):
         (([1.0, 0.0], [0.0, 1.0]), r"input a\.f: Samples: the time falls from 1 s in row 0 to 0 s"),
         (lambda t: np.nan, r"inputs: a\.f at t = 0 s: found nan"),
         ("much", r"inputs: a\.f: found 'much', expected a number"),
-        (
-            lambda t: 1 / (t - 0.45),
-            r"inputs: a\.f: the function failed at t = 0\.45 s with ZeroDivisionError: .*; expected a value at every",
-        ),
+        (lambda t: 1 / (t - 0.45), r"inputs: a\.f: the function failed at t = 0\.45 s with"),
     ],
 )
 def test_wrong_signals_are_refused(halves, samples, words):

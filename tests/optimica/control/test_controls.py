@@ -117,9 +117,7 @@ def test_linear_pieces_keep_limits_everywhere():
 
 def test_linear_pieces_over_groups_are_refused_where_borders_move():
     controls = {"mass.u": dict(kind="linear", elements=2)}
-    with pytest.raises(
-        ModelError, match="lengths='free', expected 'given' beside straight lines over several"
-    ):
+    with pytest.raises(ModelError, match="lengths='free', expected 'given' beside straight lines over"):
         optimize(FastestMass, elements=4, lengths="free", controls=controls)
 
 
@@ -204,21 +202,12 @@ def test_a_vector_of_inputs_and_inputs_of_their_own():
         ("constant", "controls='constant', expected {name of an input: dict(kind="),
         ({"mass.u": 3}, "controls mass.u: found controls=3, expected dict(kind="),
         ({"mass.u": dict(element=2)}, "did you mean 'elements'"),
-        (
-            {"mass.u": "cubic"},
-            "controls mass.u: found kind='cubic', expected 'constant', 'linear' or 'ramps'",
-        ),
-        (
-            {"mass.u": dict(kind="ramps", max_step=1.0)},
-            "ramps jump at every border, expected no other setting",
-        ),
+        ({"mass.u": "cubic"}, "controls mass.u: found kind='cubic', expected 'constant', 'linear' or"),
+        ({"mass.u": dict(kind="ramps", max_step=1.0)}, "ramps jump at every border, expected no other"),
         ({"mass.u": dict(elements=1.5)}, "found elements=1.5, expected a whole number"),
         ({"mass.u": dict(max_step=-1)}, "found max_step=-1"),
         ({"mass.u": dict(step_penalty=None)}, "found step_penalty=None, expected a number"),
-        (
-            {"mass.x": "constant"},
-            "controls: mass.x is no input that the optimiser chooses, expected one of mass.u",
-        ),
+        ({"mass.x": "constant"}, "controls: mass.x is no input that the optimiser chooses, expected one of"),
         ({"mass.w": "constant"}, "mass.w"),
     ],
 )

@@ -232,10 +232,7 @@ def test_what_would_have_to_be_chosen_is_named():
         def constraints(self):
             yield der(self.fading.y) <= 1
 
-    with pytest.raises(
-        ModelError,
-        match=r"limit the rate of what an input moves, as der\(mass\.u\), or have what der\(fading\.y\) follows",
-    ):
+    with pytest.raises(ModelError, match=r"limit the rate of what an input moves, as der\(mass\.u\), or"):
         optimize(Without)
 
 

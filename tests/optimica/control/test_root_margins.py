@@ -94,6 +94,4 @@ def test_what_rests_on_a_margin_says_so():
             yield final(self.robot.tool.v) == 0
 
     text = optimize(Drawn, elements=20).report()
-    assert (
-        "from which robot.carts[2].s follows, at its turning point (singular) but for a margin of 0.1" in text
-    )
+    assert "from which robot.carts[2].s follows, at its turning point (singular) but for a margin of" in text

@@ -198,10 +198,7 @@ def test_the_integral_of_an_error_may_be_weighed_and_joined_to_a_sum():
         (dict(times=[[0, 1]], values=[1, 2]), "found times of shape (1, 2)"),
         (dict(times=["now"], values=[1]), "Samples: found times=['now'], expected numbers"),
         (dict(times=[0], values=[None, "x"]), "Samples: found values=[None, 'x'], expected numbers"),
-        (
-            dict(times=[0, 1], values=[1, 2], kind="cubic"),
-            "found kind='cubic', expected 'linear' or 'constant'",
-        ),
+        (dict(times=[0, 1], values=[1, 2], kind="cubic"), "found kind='cubic', expected 'linear' or"),
         (dict(times=[0, 1], values=[1, 2], deviation=0), "found deviation"),
         (dict(times=[0, 1], values=[1, 2], deviation=[1, 2, 3]), "found deviation of shape (3,), expected"),
     ],

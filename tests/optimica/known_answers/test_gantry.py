@@ -96,9 +96,7 @@ def test_a_start_out_of_reach_is_named_too():
             yield initial(self.robot.tool.r) == (0.0, 4.9, -1.03)
             yield final(self.robot.tool.r) == END
 
-    with pytest.raises(
-        SolveError, match=r"the start is out of reach: `initial\(robot\.tool\.r\[1\]\) == 4\.9`"
-    ):
+    with pytest.raises(SolveError, match=r"the start is out of reach: `initial\(robot\.tool\.r\[1\]\) =="):
         optimize(Far)
 
 

@@ -242,10 +242,7 @@ def test_a_corner_in_a_recording_is_listed():
         (lambda: Path.through([[0, 0, 0], [1, np.nan, 0]]), "Path.through: found points[1, 1] = nan"),
         (lambda: Path.through([[0, 0, 0]]), "found 1 points, expected at least 2"),
         (lambda: Path.line([1, 2, 3], [1, 2, 3]), "Path.line: points[1] repeats points[0] = (1, 2, 3) m"),
-        (
-            lambda: Path.through(np.ones((3, 7))),
-            "found points of 3 x 7, expected n x 3 numbers or n x 2 numbers in m",
-        ),
+        (lambda: Path.through(np.ones((3, 7))), "found points of 3 x 7, expected n x 3 numbers or n x 2"),
         (lambda: Path.through("here"), "points"),
         (lambda: Path.through([[0, 0], [1, 0], [1, 0], [2, 0]]), "points[2] repeats points[1] = (1, 0) m"),
         (lambda: Path.recorded(np.random.default_rng(0).normal(size=(5, 3))), "found 5 points, expected at"),

@@ -167,6 +167,30 @@ def test_limits_that_hold_are_not_named_beside_one_that_is_passed():
     assert mpc.softened == ("-2 <= pole.p <= 2",)
 
 
+class Pair(Rest):
+    """Two carts that nothing joins but the program."""
+
+    other = Cart()
+
+    def integrand(self):
+        return super().integrand() + self.other.x**2 + 0.05 * self.other.u**2
+
+    def constraints(self):
+        yield self.cart.x <= 0.2
+        yield between(-1.0, self.cart.u, 1.0)
+        yield between(-0.5, self.other.v, 0.5)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_limit_that_gives_way_lets_no_other_give_way(compiled):
+    mpc = Mpc(Pair, period=0.1, elements=10)
+    if compiled:
+        mpc.compiled()
+    mpc.step({"cart.x": 2.0, "cart.v": 0.0, "other.x": 2.0, "other.v": 0.0})
+    assert mpc.softened == ("cart.x <= 0.2",)
+    assert np.abs(mpc.plan["other.v"]).max() == pytest.approx(0.5, abs=1e-6)
+
+
 def test_a_delay_of_a_period_is_foretold():
     loop = Mpc(Upright, period=0.02, elements=60, delay=1).run(stop=2.0)
     assert abs(loop["pole.th"][-1]) < 0.02

@@ -64,6 +64,21 @@ def test_a_disturbance_that_is_estimated_leaves_no_offset(problem, kind, name, t
     assert abs(offset["mass.s"][-1] - 1.0) > 1e-3
 
 
+@pytest.mark.parametrize("kind", [ExtendedKalman, MovingHorizon])
+def test_a_loop_with_an_estimator_goes_on_as_if_it_had_not_ended(kind):
+    mpc = Mpc(Reach, period=PERIOD, elements=10, disturbance=["mass.f"])
+    own: Any = dict(period=PERIOD, measured={"mass.place": 1e-3}, disturbance={"mass.f": 1.0})
+    given: Any = dict(noise={"mass.place": 1e-3}, seed=4, estimator=kind(Reach, **own))
+    plant: Any = Reach(mass=PLANT)
+    whole, first = (mpc.run(plant, stop=periods * PERIOD, **given) for periods in (10, 4))
+    found = mpc.run(plant, stop=10 * PERIOD, after=first, **given)
+    np.testing.assert_allclose(found["mass.f"], whole["mass.f"], rtol=1e-6)
+    name = "disturbance(mass.f)"
+    np.testing.assert_allclose(found.estimates[name], whole.estimates[name], rtol=1e-6)
+    with pytest.raises(ModelError, match="found the estimator None, expected that of the loop before"):
+        mpc.run(plant, stop=10 * PERIOD, after=first)
+
+
 def test_a_parameter_that_is_estimated_is_taken_by_the_controller():
     given: Any = dict(period=PERIOD, measured={"mass.s": 1e-3, "mass.v": 1e-2}, parameters={"mass.c": 2.0})
     mpc = Mpc(Reach, period=PERIOD, elements=30, parameters=["mass.c"])

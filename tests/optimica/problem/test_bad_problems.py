@@ -108,10 +108,7 @@ def test_a_guess_that_cannot_be(guess, words):
 
 def test_a_guess_from_another_model():
     other = optimize(BoundedOscillator, elements=5)
-    assert (
-        "the given solution has no variable of the problem, as mass.x; give a solution of the same"
-        in message(FastestMass, guess=other)
-    )
+    assert "the given solution has no variable of the problem, as" in message(FastestMass, guess=other)
 
 
 def test_what_is_no_problem():

@@ -30,10 +30,7 @@ class Follow(Optimization):
 def test_samples_of_a_matrix_keep_its_rows():
     optimum = optimize(Follow, elements=4)
     np.testing.assert_allclose(optimum.final("m.X"), WIDE, atol=1e-6)
-    with pytest.raises(
-        ModelError,
-        match=r"sum_of_squares: found samples of shape .*, expected \(2, 3\); give values of shape \(n, rows, columns\)",
-    ):
+    with pytest.raises(ModelError, match=r"sum_of_squares: found samples of shape .*, expected \(2, 3\)"):
         optimize(type("Flat", (Follow,), {"samples": Samples(TIMES, TIMES[:, None] * WIDE.ravel())}))
 
 
@@ -66,10 +63,7 @@ def test_known_inputs_of_a_matrix_keep_its_rows():
 
     assert np.allclose(optimize(Known, elements=2).final("m.X"), WIDE, atol=1e-9)
     flat = {"m.U": (TIMES, np.broadcast_to(WIDE.ravel(), (5, 6)))}
-    with pytest.raises(
-        ModelError,
-        match=r"input m\.U: found samples of shape .*, expected \(2, 3\); give values of shape \(n, rows, columns\)",
-    ):
+    with pytest.raises(ModelError, match=r"input m\.U: found samples of shape .*, expected \(2, 3\); give"):
         optimize(type("Flat", (Known,), {"inputs": flat}), elements=2)
 
 

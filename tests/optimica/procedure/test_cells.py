@@ -89,11 +89,7 @@ def test_robots_that_are_not_there(tmp_path, name, part):
     [
         ("[goal]", "[gaol]", "cell.toml: gaol: there is no such key; did you mean 'goal'"),
         ("[goal]", "[plan2]", "cell.toml: plan2"),
-        (
-            "[[limits.obstacles]]",
-            "[limits.obstacles]",
-            "limits.obstacles: found a table, expected a table for each",
-        ),
+        ("[[limits.obstacles]]", "[limits.obstacles]", "limits.obstacles: found a table, expected a table"),
         ('kind = "laser tracker"', 'kind = "theodolite"', "device.kind"),
         ("robots = 20", "robots = 0", "plan.robots"),
         ('speed = "100 mm/s"', 'speed = "0 mm/s"', "program.speed"),

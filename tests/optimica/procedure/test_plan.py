@@ -125,9 +125,7 @@ def test_remaining_poses_go_again_without_collision(plan):
     assert plan.remaining(Measurements(q, lost)).q[
         plan.remaining(Measurements(q, lost)).measured
     ].tolist() == [q[5].tolist()]
-    with pytest.raises(
-        ModelError, match=r"remaining: found measurements of 2 actuators, expected 3 as the plan"
-    ):
+    with pytest.raises(ModelError, match=r"remaining: found measurements of 2 actuators, expected 3 as the"):
         plan.remaining(Measurements(q[:, :2], plan.r[plan.measured]))
 
 
@@ -166,9 +164,7 @@ def test_a_loaded_plan_is_the_plan(plan, tmp_path):
     kept.write(tmp_path / "rest")
     assert not (tmp_path / "rest" / "workspace.png").exists()
     longer = robot.modified(dict(arms=[dict(length=2.1), dict(), dict()]))
-    with pytest.raises(
-        ModelError, match=r"arms\[0\].length = 2.1, expected 2.06.* as planned; .* or plan again"
-    ):
+    with pytest.raises(ModelError, match=r"arms\[0\].length = 2.1, expected 2.06.* as planned; .* or plan"):
         load_plan(tmp_path, longer, limits)
     strict = replace(limits, clearance=limits.clearance + 0.05)  # the cell has changed since
     less = load_plan(tmp_path, robot, strict)
@@ -177,7 +173,5 @@ def test_a_loaded_plan_is_the_plan(plan, tmp_path):
     assert clear_ways(less.cell.fleet, anew.q[:-1], anew.q[1:]).all()
     assert anew.measured.sum() + len(anew.lost) - len(plan.lost) == 6
     limits = replace(limits, strokes=(-0.6, 0.9))
-    with pytest.raises(
-        ModelError, match=r"load_plan: found F1GantryTau with .* expected the robot of the plan, GantryTau"
-    ):
+    with pytest.raises(ModelError, match=r"load_plan: found F1GantryTau with .* expected the robot of the"):
         load_plan(tmp_path, F1GantryTau(prototypes.F1), limits)

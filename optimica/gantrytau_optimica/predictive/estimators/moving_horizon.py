@@ -138,7 +138,7 @@ class MovingHorizon(StateEstimator):
             rows = self._bounded.size
             finite = np.isfinite(one.bounds[:, self._bounded])
             self._programs[n] = HorizonProgram(
-                n + 1, stages.nx, stages.nx, np.zeros(rows, bool), finite, 1.0, ridge=0.0
+                n + 1, stages.nx, stages.nx, np.full(rows, -1), finite, 1.0, ridge=0.0
             )
         D = self._spread()
         self._programs[n].load(stage, D[:, None] * H[-1] * D, D * g[-1])

@@ -92,7 +92,12 @@ class ObservedModel:
         limits: Any = {"least": 0.0} if least else {"above": 0.0}
         found: dict[str, float] = {}
         for name, value in given.items():
-            one = value if np.ndim(value) else number(self.place, f"{argument}[{name}]", value, **limits)
+            unit = self.flat.unit(name)
+            one = (
+                value
+                if np.ndim(value)
+                else number(self.place, f"{argument}[{name}]", value, unit=unit, **limits)
+            )
             found |= named_values(self.flat, self.place, argument, {name: one}, tuple(names), alike=True)
         for name, value in found.items():
             number(self.place, f"{argument}[{name}]", value, **limits)

@@ -3,6 +3,8 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy
+from types import NoneType
 from typing import Any, Literal
 
 import numpy as np
@@ -86,6 +88,17 @@ class StateEstimator(ABC):
         self._t: float | None = None
         self._u = np.zeros(self.observed.stages.nu)
         self._beyond = np.zeros(len(self.outputs), dtype=int)  # samples in a row beyond the gate
+
+    @property
+    def memory(self) -> dict[str, Any]:
+        """What a step takes from those before it."""
+        return {
+            k: copy(v) for k, v in vars(self).items() if isinstance(v, (np.ndarray, float, str, NoneType))
+        }
+
+    def recall(self, memory: Mapping[str, Any]) -> None:
+        """Be as with this memory, of the same estimator or one like it."""
+        vars(self).update({k: copy(v) for k, v in memory.items()})
 
     def step(
         self, measured: Mapping[str, Any], inputs: Mapping[str, Any] | None = None, t: float | None = None

@@ -22,18 +22,19 @@ SHOWN = 12  # plans in a figure
 
 @dataclass(frozen=True, eq=False)
 class LoopEnd:
-    """Where a loop with a model ended. controller: its `key`; plan: its last; made: all, without stages; applied: inputs of
-    the last step; now, waiting: those held, and those that follow; motion: of the plant, scaled; random: state of the noise.
+    """Where a loop with a model ended. controller: its `key`; memory: of it; made: all plans, without stages; now, waiting:
+    inputs held, and those that follow; motion: of the plant, scaled; random: state of the noise; estimator: its kind, what
+    it estimates of what, and its memory, None without one.
     """
 
     controller: tuple[Any, ...]
-    plan: PlannedMotion | None
+    memory: Any
     made: tuple[PlannedMotion, ...]
-    applied: Mapping[str, float]
     now: Mapping[str, float]
     waiting: Mapping[str, float]
     motion: PlannedMotion
     random: Mapping[str, Any]
+    estimator: tuple[str, Mapping[str, Any]] | None = None
 
 
 @dataclass(frozen=True, eq=False)

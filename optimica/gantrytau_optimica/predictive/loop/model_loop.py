@@ -88,28 +88,30 @@ def model_loop(
     plant = _ModelPlant(mpc, model, start, sensors)
     parameters = dict(plant.built.read.dae.parameter_values)
     now, waiting, made, statuses = mpc.held, mpc.held, list[PlannedMotion](), list[str]()
-    plan: Any = None
     if after is not None:
         instance("run", "after", after, ClosedLoop, "what run returned")
-        if sensors.estimator is not None or after.estimates:
-            words = "found an estimator, which is not where it was then, expected none; run to the later stop at once"
-            raise ModelError(words, place="run", argument="after")
         before = end_of(mpc, after, parameters, start)
+        sensors.goes_on(before, after.estimates)
         plant.goes_on(before.motion, after.cost)
         made, statuses, now, waiting = list(before.made), list(after.statuses), before.now, before.waiting
-        sensors.random.bit_generator.state = before.random
     for k in range(len(made), samples(stop, mpc.period, len(made))):
         t = k * mpc.period
         given = mpc.step(sensors.told(plant.measured(now, t), now, t), t)
         statuses.append(mpc.status)
-        plan = mpc.planned_motion(plant.state(), t)
-        made.append(plan.without_stages())
+        made.append(mpc.planned_motion(plant.state(), t).without_stages())
         mpc.prepare()
         now, waiting = (waiting, given) if mpc.delay else (given, given)
         plant.hold(now, t)
     found = motion_result(plant.built, plant.stages, plant.motion, mpc.period, f"{mpc.name}, closed loop")
     end = LoopEnd(
-        mpc.key, plan, tuple(made), mpc.held, now, waiting, plant.motion, sensors.random.bit_generator.state
+        mpc.key,
+        mpc.memory,
+        tuple(made),
+        now,
+        waiting,
+        plant.motion,
+        sensors.random.bit_generator.state,
+        sensors.memory,
     )
     kept: Any = dict(estimates=sensors.estimates, parameters=parameters, end=end)
     planned = planned_by(mpc, made, found.time)
@@ -143,5 +145,5 @@ def end_of(mpc: Any, after: Any, parameters: Mapping[str, float], start: Mapping
         words = "start= beside it, expected none: the loop goes on from where it ended"
     if end is None or words:
         raise ModelError(f"found after= a loop with {words}", place="run", argument="after")
-    mpc.resume(end.plan, end.applied, after.timing)
+    mpc.resume(end.memory, after.timing)
     return end

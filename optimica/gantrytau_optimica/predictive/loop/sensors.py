@@ -10,6 +10,7 @@ from gantrytau import DoubtfulResult, ModelError
 from gantrytau.border.checks import instance, number
 from gantrytau.border.refusal import Given
 from gantrytau_optimica.predictive.estimators.state_estimator import StateEstimator
+from gantrytau_optimica.predictive.loop.closed_loop import LoopEnd
 
 
 class Sensors:
@@ -35,7 +36,10 @@ class Sensors:
                     place="run",
                     found=Given("noise", name),
                 )
-            self._spread[self.names.index(name)] = number("run", f"noise[{name}]", value, least=0.0)
+            unit = mpc.built.read.dae.flat.unit(name)
+            self._spread[self.names.index(name)] = number(
+                "run", f"noise[{name}]", value, unit=unit, least=0.0
+            )
         self.random = np.random.default_rng(seed)
         self._estimates: list[dict[str, float]] = []
         if estimator is not None:
@@ -67,6 +71,29 @@ class Sensors:
         """Courses of the estimates by name."""
         first = self._estimates[0] if self._estimates else {}
         return {name: np.array([one[name] for one in self._estimates]) for name in first}
+
+    @property
+    def memory(self) -> tuple[str, Mapping[str, Any]] | None:
+        """The estimator's kind, what it estimates of what, and its memory."""
+        if (one := self.estimator) is None:
+            return None
+        return (
+            f"{type(one).__name__} of {', '.join(one.observed.names)} from {', '.join(one.outputs)}",
+            one.memory,
+        )
+
+    def goes_on(self, end: LoopEnd, estimates: Mapping[str, np.ndarray]) -> None:
+        """Be as where a loop ended; ModelError for another estimator."""
+        own = self.memory
+        was, now = (None if memory is None else memory[0] for memory in (end.estimator, own))
+        if was != now:
+            words = f"found the estimator {now or 'None'}, expected that of the loop before, {was or 'None'}"
+            raise ModelError(words, place="run", argument="estimator")
+        if self.estimator is not None and end.estimator is not None:
+            self.estimator.recall(end.estimator[1])
+            columns = zip(*estimates.values(), strict=True)
+            self._estimates = [dict(zip(estimates, map(float, row), strict=True)) for row in columns]
+        self.random.bit_generator.state = end.random
 
     def told(self, measured: np.ndarray, inputs: Mapping[str, float], t: float) -> dict[str, float]:
         """The state as the controller is told it, with estimates. measured: of `names`; inputs: those held until t."""

@@ -234,18 +234,14 @@ def test_a_port_that_is_refused_stays_closed():
 
 @pytest.mark.parametrize("token", ["", " ", "two\tparts", "line\n", "schlüssel", "\udc80", 5, b"bytes"])
 def test_tokens_that_do_not_travel_are_refused(token):
-    with pytest.raises(
-        ModelError, match="serve: found a token with spaces, signs that are not ASCII, or nothing"
-    ):
+    with pytest.raises(ModelError, match="serve: found a token with spaces, signs that are not ASCII, or"):
         Controller(slide(), lambda t, values: {}).serve(token=token)
 
 
 @pytest.mark.parametrize("name", ["two\tparts", "line\n", "\x1b[31m", "a\u2028b", "\udc80", ""])
 def test_names_that_are_no_line_are_refused_before_they_are_sent(name):
     if name:
-        with pytest.raises(
-            ModelError, match=r"declaration: found the name .*, expected a text that can be printed"
-        ):
+        with pytest.raises(ModelError, match=r"declaration: found the name .*, expected a text that can be"):
             as_text(Introduction(name))
     else:
         assert as_text(Introduction(name)) == "name\t\ntoken\t\n"

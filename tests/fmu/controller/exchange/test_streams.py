@@ -71,10 +71,7 @@ def test_rows_of_another_period_are_refused_and_the_robot_goes_on(tmp_path):
     stream = stream_file(corrections(tmp_path / "u.csv", step=0.001))
     found = run(stream, "stream.dq")
     failure = found.timing.clients["stream"].failure
-    assert (
-        "found rows 0.001 s apart for samples every 0.004 s, expected one for each sample; resample the file"
-        in failure
-    )
+    assert "found rows 0.001 s apart for samples every 0.004 s, expected one for each sample" in failure
     assert found.timing.samples == N + 1
 
 

@@ -160,18 +160,9 @@ def test_customary_results_beside_a_foreign_fmu_are_run_again(tank, filling, tmp
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: simulate(Tank(), stop=1.0, outputs=["h"]),
-            r"reference: found no 'q' in the result, expected all inputs",
-        ),
-        (
-            lambda: simulate(Tank(), start=1.0, stop=2.0),
-            r"found results from 1 to 2 s, expected some from 0 s",
-        ),
-        (
-            lambda: Result([0, 1], {"q": 0.0, "level": [1.0, np.nan], "above": 0.0}),
-            r"level is nan at t = 1 s, expected a finite",
-        ),
+        (lambda: simulate(Tank(), stop=1.0, outputs=["h"]), r"reference: found no 'q' in the result"),
+        (lambda: simulate(Tank(), start=1.0, stop=2.0), r"found results from 1 to 2 s, expected some from 0"),
+        (lambda: Result([0, 1], {"q": 0.0, "level": [1.0, np.nan], "above": 0.0}), r"level is nan at t = 1"),
         (lambda: -1.0, r"export_fmu: .*reference.*-1"),
         (lambda: "much", r"reference: found 'much', expected a number"),
     ],

@@ -170,10 +170,7 @@ def test_one_row_and_many_in_words():
 def test_files_that_are_no_text(tmp_path, content):
     path = tmp_path / "measurements.csv"
     path.write_bytes(content)
-    with pytest.raises(
-        ModelError,
-        match=r"measurements\.csv: cannot be read as text \(.*save it as CSV with the encoding UTF-8",
-    ):
+    with pytest.raises(ModelError, match=r"measurements\.csv: cannot be read as text \(.*save it as CSV"):
         Measurements.read(path)
 
 
@@ -190,7 +187,5 @@ def test_columns_may_be_in_other_units(tmp_path):
     with pytest.raises(ModelError, match=r"mm\.csv: column x: found 'deg', an angle, expected a length in m"):
         Measurements.read(path)
     path.write_text("q1 [furlong],x,y,z\n700,1,2,3\n")
-    with pytest.raises(
-        ModelError, match=r"column 'q1 \[furlong\]': unit 'furlong': there is no unit 'furlong'"
-    ):
+    with pytest.raises(ModelError, match=r"column 'q1 \[furlong\]': unit 'furlong': there is no unit"):
         Measurements.read(path)

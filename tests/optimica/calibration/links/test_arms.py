@@ -204,9 +204,7 @@ def test_what_cannot_be_an_arm_is_refused():
     with pytest.raises(ModelError, match="FourBar that does not say what its rods are"):
         read_arms(FourBar())
     stretched = F1GantryTau(prototypes.F1, turntables=[dict(orientation=[1.0, 0.1, 0.0, 0.0]), {}, {}])
-    with pytest.raises(
-        ModelError, match=r"turntables\[0\]\.orientation: found a quaternion of length 1\.00499"
-    ):
+    with pytest.raises(ModelError, match=r"turntables\[0\]\.orientation: found a quaternion of length"):
         read_arms(stretched)
     assert read_arms(stretched, "free")[1].count == 24
 

@@ -248,31 +248,15 @@ def test_what_is_no_step_response(arguments, wrong):
         ([JUMP], ModelError, "expected a StepResponse"),
         ([StepResponse(T, 0 * T, JUMP)], ModelError, "no step of actuator 0: its reference never changes"),
         ([StepResponse(T, JUMP, 0 * T)], ModelError, "actuator 0 does not move in step 0"),
-        (
-            [StepResponse(T[:30], JUMP[:30], JUMP[:30])],
-            ModelError,
-            "found 4 rows of step 0 from where the reference",
-        ),
+        ([StepResponse(T[:30], JUMP[:30], JUMP[:30])], ModelError, "found 4 rows of step 0 from where the"),
         (
             [StepResponse(T, JUMP, JUMP), StepResponse(T, np.ones((100, 2)), np.ones((100, 2)))],
             ModelError,
             "step 1 of 2 actuators beside step 0 of 1",
         ),
-        (
-            [StepResponse(T, JUMP, JUMP), StepResponse(2 * T, JUMP, JUMP)],
-            ModelError,
-            "step 1 every 0.008 s beside step 0 every 0.004 s",
-        ),
-        (
-            [StepResponse(T, JUMP, np.sin(300 * T))],
-            IdentificationError,
-            "of the motion of actuator 0, expected more than 30 %",
-        ),
-        (
-            [StepResponse(T, JUMP, np.cumsum(JUMP))],
-            IdentificationError,
-            "does not come to an end of its motion",
-        ),
+        ([StepResponse(T, JUMP, JUMP), StepResponse(2 * T, JUMP, JUMP)], ModelError, "step 1 every 0.008 s"),
+        ([StepResponse(T, JUMP, np.sin(300 * T))], IdentificationError, "of the motion of actuator 0"),
+        ([StepResponse(T, JUMP, np.cumsum(JUMP))], IdentificationError, "does not come to an end of its"),
     ],
 )
 def test_steps_that_tell_nothing(measured, error, words):

@@ -134,9 +134,7 @@ def test_a_system_that_runs_away_is_refused_and_one_that_drifts_is_told():
 
 def test_other_data_are_refused_by_name():
     found = identify_system(INPUTS, OUTPUTS, order=8, period=PERIOD)
-    with pytest.raises(
-        ModelError, match=r"found u of shape \(6000, 2\), expected \(N, 3\), as it was identified with"
-    ):
+    with pytest.raises(ModelError, match=r"found u of shape \(6000, 2\), expected \(N, 3\), as it was"):
         found.fit(INPUTS[:, :2], OUTPUTS)
     constants = found.follow(INPUTS, OUTPUTS + 4.0) - found.follow(INPUTS, OUTPUTS)
     np.testing.assert_allclose(constants, 4.0, atol=1e-9)

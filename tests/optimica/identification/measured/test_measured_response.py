@@ -64,10 +64,7 @@ X = np.random.default_rng(0).normal(size=(400, 2))
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (
-            lambda: measured_response(X, X[:300], period=0.1),
-            "400 samples of u and 300 of y, expected as many of both, 256",
-        ),
+        (lambda: measured_response(X, X[:300], period=0.1), "400 samples of u and 300 of y, expected as"),
         (lambda: measured_response(X[:99], X[:99], period=0.1), "99 samples of u and 99 of y"),
         (lambda: measured_response(X, X, period=0.1, blocks=3), "blocks=3 for 2 inputs, expected 4 at least"),
         (lambda: measured_response(0 * X, X, period=0.1), r"found that u\[0\] never changes"),

@@ -120,10 +120,7 @@ def test_the_report_says_what_is_weak(robot, tmp_path):
     ("keywords", "words"),
     [
         (dict(parameters="plate"), "there is no parameter 'plate'; did you mean 'plate_mass'"),
-        (
-            dict(parameters="plate_mass", fixed=dict(plate_mass=1)),
-            "plate_mass stand in parameters= and in fixed=",
-        ),
+        (dict(parameters="plate_mass", fixed=dict(plate_mass=1)), "plate_mass stand in parameters= and in"),
         (dict(fixed=dict(link_masses=[1, 2])), "expected a number, or one for each of link_masses[0]"),
         (dict(fixed=dict(plate_mass="heavy")), "fixed value of plate_mass is 'heavy', expected a number"),
         (dict(minimum_speed=10.0), "no joint is ever faster than minimum_speed"),

@@ -151,10 +151,7 @@ def test_a_plate_that_does_not_turn_tells_its_mass_only():
     [
         (dict(parameters=["tool", "tool.r_cm[0]"]), "tool.r_cm[0] and the body tool stand together"),
         (dict(fixed={"tool.J[0,0]": 0.1}), "tool.J[0,0] and the body tool stand together"),
-        (
-            dict(fixed=dict(plate_mass=0.0)),
-            "the body tool has a mass of 0 kg, expected more than 0 to begin with",
-        ),
+        (dict(fixed=dict(plate_mass=0.0)), "the body tool has a mass of 0 kg, expected more than 0 to begin"),
     ],
 )
 def test_what_is_set_twice_or_has_no_mass_is_refused(keywords, words):

@@ -145,22 +145,13 @@ def test_moved_resonances_begin_no_earlier():
         (lambda: design_q(one(), limit=200.0), "limit=200.0, expected a number below 125"),
         (lambda: design_q([]), "responses of another kind"),
         (lambda: design_q([one(), coupled(0.1)]), r"\[1, 2\] axes, expected one of both"),
-        (
-            lambda: design_q(StateSpace(-1, 1, 1)),
-            "a continuous response, expected a period, one of all; take system.discrete",
-        ),
-        (
-            lambda: design_q(one(), learning=Learning(law=Gradient(one()))),
-            "the law Gradient, expected a gain",
-        ),
+        (lambda: design_q(StateSpace(-1, 1, 1)), "a continuous response, expected a period, one of all"),
+        (lambda: design_q(one(), learning=Learning(law=Gradient(one()))), "the law Gradient, expected a"),
         (lambda: uncertain(one(), frequencies=(0.0,)), r"frequencies=\(0.0,\), expected numbers above zero"),
         (lambda: uncertain(one(), damping=(50.0,)), "damping ratio 2, expected one below half"),
         (lambda: uncertain(one(), frequencies=(20.0,)), "becomes 160 Hz"),
         (lambda: uncertain(StateSpace(-1, 1, 1)), "found a continuous system, expected one that is sampled"),
-        (
-            lambda: design_q(StateSpace(0.5, -0.5, 1, period=PERIOD)),
-            r"sigma 1.\d* at 0 Hz however far filters close, expected 0.95; what is learnt from turns its sign",
-        ),
+        (lambda: design_q(StateSpace(0.5, -0.5, 1, period=PERIOD)), r"sigma 1.\d* at 0 Hz however far"),
     ],
 )
 def test_what_does_not_fit_is_told(wrong, words):

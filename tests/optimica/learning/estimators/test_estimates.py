@@ -95,9 +95,7 @@ def test_records_with_holes_are_refused():
     with pytest.raises(ModelError, match=r"found 0\.008 s after row 332 of a run and 0\.004 s elsewhere"):
         Complementary().estimate(lost, KINEMATICS)
     away = {name: run[name] + 50.0 * (name == "measured.q[0]") for name in run.names}
-    with pytest.raises(
-        ModelError, match=r"measured\.q that puts the tool out of reach at 0 s in 900 of 900 rows"
-    ):
+    with pytest.raises(ModelError, match=r"measured\.q that puts the tool out of reach at 0 s in 900 of 900"):
         Kinematic().estimate(Result(run.time, away), KINEMATICS)
 
 
