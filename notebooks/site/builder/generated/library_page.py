@@ -28,10 +28,14 @@ processor time for an example. Where a signal leaves within the first hundredth 
 with output times that are as many. Runs go on through singular poses (`singular="cross"`), as those of the reference did.
 Times below are processor time: from text to the integration, and the integration.
 
+The tables called `usertab` ask for functions in C. `TestMove` gives a position, a speed and an acceleration that contradict
+each other; derivatives are those of the position here, as the annotation `derivative` of functions is not read. In
+`TestFriction` a flag of the reference is up for 1.8e-6 s before the motion begins.
+
 Of libraries of others, without reference results, the examples are run and no more: those that came to the end of their
 annotation `experiment` "ran". `MODELICAPATH=folder:folder_of_Modelica make library-results ONLY=PlanarMechanics`.
 """
-PEER = """A sample, evenly spread over the names of each package, simulated by {name} on the same machine ({date}): the same
+PEER = """A sample of each package, as far as it was run, simulated by {name} on the same machine ({date}): the same
 start, stop, tolerance and output times, compared in the same tubes. Times are processor time of all threads. {name} runs all
 examples in one session, which keeps what it has read; here each has a process of its own, which reads what it needs.
 
