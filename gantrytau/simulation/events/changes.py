@@ -107,8 +107,7 @@ class Changes:
 
     def renew(self, k: int) -> None:
         """Give new values to what is sampled at a place, all from the values just before."""
-        trail = self.trail
-        due = trail.due[k]
+        trail, due = self.trail, self.trail.due[k]
         if not due.any():
             return
         t = float(trail.t[k])

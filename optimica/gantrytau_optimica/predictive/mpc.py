@@ -244,7 +244,7 @@ class Mpc:
         *,
         stop: float,
         start: Mapping[str, Any] | None = None,
-        noise: Mapping[str, float] | None = None,
+        noise: Mapping[str, Any] | None = None,
         seed: int = 0,
         estimator: StateEstimator | None = None,
         after: ClosedLoop | None = None,

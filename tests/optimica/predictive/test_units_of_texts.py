@@ -1,5 +1,7 @@
 """Texts with their units, "5 mm", wherever a controller in the loop takes a quantity."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,8 +15,8 @@ def mpc(**keywords):
 
 
 def test_a_run_reads_texts():
-    texts = {"noise": {"sledge.s": "5 mm"}, "start": {"sledge.s": "900 mm", "sledge.v": "1 mm/s"}}
-    numbers = {"noise": {"sledge.s": 5e-3}, "start": {"sledge.s": 0.9, "sledge.v": 1e-3}}
+    texts: Any = {"noise": {"sledge.s": "5 mm"}, "start": {"sledge.s": "900 mm", "sledge.v": "1 mm/s"}}
+    numbers: Any = {"noise": {"sledge.s": 5e-3}, "start": {"sledge.s": 0.9, "sledge.v": 1e-3}}
     one, two = (mpc().run(stop=0.3, **given) for given in (texts, numbers))
     np.testing.assert_allclose(one["sledge.s"], two["sledge.s"], rtol=1e-12)
 
@@ -25,7 +27,7 @@ def test_rates_are_in_the_unit_of_the_input_per_second():
 
 
 def test_an_estimator_reads_texts():
-    given = (
+    given: Any = (
         {"measured": {"sledge.s": a}, "prior": {"sledge.v": b}}
         for a, b in (("1 mm", "10 mm/s"), (1e-3, 0.01))
     )

@@ -19,7 +19,7 @@ class Sensors:
     def __init__(
         self,
         mpc: Any,
-        noise: Mapping[str, float],
+        noise: Mapping[str, Any],
         seed: int,
         estimator: StateEstimator | None,
     ):
