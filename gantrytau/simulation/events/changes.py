@@ -333,8 +333,7 @@ class Changes:
         known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
         if np.any(self._rounded > known):
             self.trail.x[k], self.trail.z[k] = before[:2]
-            self._agree(k, tried[1], errors, left)
-            return
+            return self._agree(k, tried[1], errors, left)
         raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
 
     def _rounding(self, k: int, tried: Sequence[np.ndarray], before: Point) -> np.ndarray:
