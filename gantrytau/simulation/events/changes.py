@@ -307,7 +307,7 @@ class Changes:
 
         errors: by which margins are known at least; left: the point before Discretes of differentiated equations jumped.
         """
-        x, z, t, w = self.point(k)
+        (x, z, t, w), dae = self.point(k), self.coordinates.dae
         before = left or (x.copy(), z.copy(), t, w.copy())
         tried = [] if left else [self.modes(k).copy()]
         while not any(np.array_equal(modes, old) for old in tried):
@@ -316,8 +316,7 @@ class Changes:
             if np.array_equal(modes, tried[-1]):
                 return
             if len(tried) > LONGEST_CIRCLE:  # each leads further away, as floor(x) with a gain above one
-                changing = np.flatnonzero(modes != tried[0])
-                raise run_ends.no_side(self.coordinates.dae, float(t), self.conditions(changing))
+                raise run_ends.no_side(dae, float(t), self.conditions(np.flatnonzero(modes != tried[0])))
         # one leads to another in a circle: all choices of what changed, the nearest to the first first
         switches, changing = self.coordinates.switches, np.flatnonzero(np.ptp(tried, axis=0) > 0)
         chosen = changing[~switches.derived[changing]]  # the others follow from these
@@ -333,8 +332,9 @@ class Changes:
         known, self._rounded = self._rounded, np.maximum(self._rounded, self._rounding(k, tried, before))
         if np.any(self._rounded > known):
             self.trail.x[k], self.trail.z[k] = before[:2]
-            return self._agree(k, tried[1], errors, left)
-        raise run_ends.no_side(self.coordinates.dae, float(self.trail.t[k]), self.conditions(changing))
+            self._agree(k, tried[1], errors, left)
+            return
+        raise run_ends.no_side(dae, float(t), self.conditions(changing))
 
     def _rounding(self, k: int, tried: Sequence[np.ndarray], before: Point) -> np.ndarray:
         """What rounding makes of the margins of a place, (switches,), the most in some modes."""
