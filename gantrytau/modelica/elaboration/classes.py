@@ -247,6 +247,8 @@ def _first_values(structure: Structure, held: Collection[str]) -> Iterator[tuple
 
 def _held_by_equations(structure: Structure) -> Iterator[str]:
     """Names of Booleans and Integers whose equations ask for values before."""
+    if not any(one.asks_before for one in structure.scope.sections):
+        return
     asked = _asked_before(structure)
     for section in _all_sections(structure):
         for item in section.items if section.kind == "equation" else ():
@@ -271,7 +273,7 @@ def _held(structure: Structure) -> Iterator[str]:
 def _asked_before(structure: Structure) -> set[str]:
     """Names of the Booleans whose values before an instant are asked for."""
     tests = {id(one) for item in whens_in(structure) for test, _ in item.branches for one in instants(test)}
-    running = (one for one in structure.scope.sections if one.kind != "initial equation")
+    running = [one for one in structure.scope.sections if one.asks_before and one.kind != "initial equation"]
     calls = (one for section in running for one in nodes_of(section.items))
     asked = [c for c in calls if isinstance(c, tree.Call) and id(c) not in tests and c.arguments]
     asked = [c.arguments[0] for c in asked if c.function.parts[0][0] == "pre"]
@@ -289,7 +291,7 @@ def _followed(structure: Structure) -> dict[str, tuple[int, ...]]:
     alone = {id(one) for test, _ in branches for one in instants(test)}
     said = [one.element.declaration.modification for one in structure.members.values()]
     found: dict[str, tuple[int, ...]] = {}
-    for call in calls_before([said, [section.items for section in structure.scope.sections]]):
+    for call in calls_before([said, [one.items for one in structure.scope.sections if one.asks_before]]):
         asked, name = call.function.parts[0][0], whole_name(call.arguments[0])
         one = structure.leaf(cast(tree.ComponentReference, call.arguments[0]))
         if one is None or one.is_parameter or 0 in one.shape or (asked == "edge" and id(call) in alone):

@@ -2,11 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from gantrytau.modelica import tree
+from gantrytau.modelica.conditions import BEFORE
+from gantrytau.modelica.references import nodes_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,6 +190,12 @@ class StatementSection:
     kind: str
     items: tuple[tree.EquationOrStatement, ...]
     scope: Any
+
+    @cached_property
+    def asks_before(self) -> bool:
+        """Whether it asks for values before an instant: calls of `pre`, `edge` and `change`."""
+        calls = (one for one in nodes_of(self.items) if isinstance(one, tree.Call))
+        return any(one.function.parts[0][0] in BEFORE for one in calls)
 
 
 def _redeclaration(one: tree.Redeclaration, scope: Any) -> tuple[str, Modifier]:
