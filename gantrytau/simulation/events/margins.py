@@ -17,6 +17,7 @@ from gantrytau.simulation.singular_poses import Point
 JUMP = 1e-6  # of the largest rate or algebraic: less is no jump
 ALGEBRAICS = 8  # times rounding, to which they solve their equations
 ROUNDING = 8 * np.finfo(float).eps  # of the terms of a margin, below which it is zero
+SETTLED = 4 * np.finfo(float).eps  # of the largest algebraic, to which all of them are known
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ class Switches:
         along = by_t + (by_x @ ode if x.numel() else 0)
         terms = ca.fabs(by_x) @ ca.fmax(ca.fabs(x), self._size) if x.numel() else ca.SX(len(turns), 1)
         terms += ca.fabs(by_z) @ ca.fabs(z) + ca.fabs(by_t * time) if z.numel() else ca.fabs(by_t * time)
-        found = [margins, along, terms]
+        by_algebraics = by_x @ ca.jacobian(ode, z) if x.numel() and z.numel() else ca.SX(len(turns), 1)
+        found = [margins, along, terms, ca.sum2(ca.fabs(by_algebraics))]
         self._of_algebraics = bool(by_z.nnz())
         if self._of_algebraics:  # z' = -(dg/dz)^-1 (dg/dx x' + dg/dt)
             change = ca.jacobian(algebraic, time) + (ca.jacobian(algebraic, x) @ ode if x.numel() else 0)
@@ -92,16 +94,18 @@ class Switches:
         """The margins at places: x (places, n), z (places, m), t (places,), w (places, k); size: of states, (n,)."""
         places = len(t)
         found = self._look(x, z, t, t, w, size[None])
-        values, rates, terms = found[:3]
+        values, rates, terms, gains = found[:4]
         if self._of_algebraics:
             m = z.shape[1]
-            by_z = found[3].reshape(places, m, len(self)).transpose(0, 2, 1)
-            inner = found[4].reshape(places, m, m).transpose(0, 2, 1)
-            change = found[5][:, :, None]
+            by_z = found[4].reshape(places, m, len(self)).transpose(0, 2, 1)
+            inner = found[5].reshape(places, m, m).transpose(0, 2, 1)
+            change = found[6][:, :, None]
             # what a margin loses by a singular matrix is found in more steps
             with contextlib.suppress(np.linalg.LinAlgError):
                 rates -= (by_z @ np.linalg.solve(inner, change))[:, :, 0]
         rates[~np.isfinite(rates)] = 0.0  # what only the other side may ask
+        # algebraics are known to rounding of the largest of them: at rest no side follows from less
+        rates[np.abs(rates) <= SETTLED * np.abs(z).max(axis=1, initial=0.0, keepdims=True) * gains] = 0.0
         noise = ROUNDING * terms + 8 * np.spacing(np.abs(t))[:, None] * np.abs(rates)
         return SwitchMargins(values, rates, noise)
 
@@ -117,7 +121,7 @@ class Switches:
         if self._of_algebraics:
             by_z, jacobian = (
                 a.reshape(len(t), z.shape[1], -1).transpose(0, 2, 1)
-                for a in self._look(x, z, t, t, w, np.ones((1, x.shape[1])))[3:5]
+                for a in self._look(x, z, t, t, w, np.ones((1, x.shape[1])))[4:6]
             )
             own += (np.abs(by_z @ np.linalg.pinv(np.nan_to_num(jacobian))) @ inner[:, :, None])[:, :, 0]
         return ALGEBRAICS * own
