@@ -177,7 +177,9 @@ def test_a_binary_that_is_none(path, name, content, message):
 
 
 def test_nothing_to_run(path):
-    assert "error: it has neither binaries for all its interfaces" in told(pack(path, {DESCRIPTION: FMI3}))
+    assert "error: it has neither binaries for all its interfaces nor sources" in told(
+        pack(path, {DESCRIPTION: FMI3})
+    )
 
 
 def test_a_trial_run_of_what_is_good(path):
