@@ -32,8 +32,8 @@ The tables called `usertab` ask for functions in C. `TestMove` gives a position,
 each other; derivatives are those of the position here, as the annotation `derivative` of functions is not read. In
 `TestFriction` a flag of the reference is up for 1.8e-6 s before the motion begins.
 
-The start of `FullRobot` leaves open how motors and frictions at rest share the weight of the arms: the reference gives all of
-it to the motors, a start here divides it.
+The start of `FullRobot` leaves open how motors and frictions at rest share the weight of the arms: the reference gives all
+of it to the motors, a start here divides it.
 
 Of libraries of others, without reference results, the examples are run and no more: those that came to the end of their
 annotation `experiment` "ran". `MODELICAPATH=folder:folder_of_Modelica make library-results ONLY=PlanarMechanics`.
