@@ -145,7 +145,7 @@ def sampled(variable: Any, expression: Any, *, period: Any, start: Any = None) -
 def by_law(
     found: Sequence[Any], law: Callable[[float, np.ndarray], Sequence[float]], given: Sequence[Any]
 ) -> Lawful:
-    """State that sampled scalars take, instead of what `sampled` says, what a function of Python makes of other ones.
+    """State that a Python function gives the values of sampled scalars, in place of the expressions of `sampled`.
 
     law(t, values of given behind the instant) -> values of found, at every instant of found; all have one period.
     The same arguments must give the same values, however often it is asked: what it remembers goes by a counter among the

@@ -80,7 +80,7 @@ def targets(items: Items) -> Iterator[str]:
 
 
 def joined_whens(items: Items) -> list[tree.EquationOrStatement]:
-    """Statements, of which each `when` behind one that sets the same variables is a chain with it, the later one first.
+    """Statements in which neighbouring `when` that set the same variables are one chain, the later one first.
 
     What the former one sets alone, or does beside, stays a `when` before the chain.
     """
@@ -96,7 +96,7 @@ def joined_whens(items: Items) -> list[tree.EquationOrStatement]:
 
 
 def _parted(first: tree.Branching, last: tree.Branching) -> tuple[Any, Any] | None:
-    """The branches of a `when` in an algorithm: what it sets alone, and what another one behind it sets as well.
+    """The branches of a `when` in an algorithm in two parts: its own variables, and those of the next `when`, too.
 
     None where there is nothing to join, or the two depend on each other.
     """

@@ -88,7 +88,7 @@ def _expression(e: tree.Expression) -> tuple[str, int]:
 
 
 class Field(str):
-    """A text that formats with another one before it, and as nothing where it is empty."""
+    """A text with a prefix when it is formatted; an empty text stays empty, without the prefix."""
 
     def __format__(self, before: str) -> str:
         return before + self if self else ""

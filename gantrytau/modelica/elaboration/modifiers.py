@@ -105,7 +105,7 @@ NOTHING = Modifier()
 
 
 def annotated(arguments: tree.Annotation, *names: str) -> tree.Modification | None:
-    """What an annotation says under a name, or under names one inside of another; None where it says nothing."""
+    """The value of a name in an annotation, or of names inside of each other; None where the name is missing."""
     found = None
     for name in names:
         said = (one for one in arguments or () if isinstance(one, tree.Argument) and one.name == name)

@@ -140,7 +140,7 @@ class Switches:
         return np.where(self._counts, np.floor(margins), on)
 
     def concluded(self, modes: np.ndarray, w: np.ndarray) -> np.ndarray:
-        """Modes with those that are derived as they follow from the others; w: as of a point."""
+        """The same modes, the derived ones computed from the others; w: inputs and modes of a point."""
         w, modes = w.copy(), modes.copy()
         for _ in range(len(self)):
             w[w.size - modes.size :] = modes
