@@ -88,7 +88,7 @@ class Structure(Members):
         return modifier.picked(found)
 
     def outward(self) -> "Iterator[Structure]":
-        """The instance, and those of which it is a component, up to the whole model."""
+        """The instance, then the instances around it, up to the whole model."""
         yield self
         if self.around is not None:
             yield from self.around.outward()

@@ -372,7 +372,7 @@ class Mpc:
         return plan if self._guess is None else guessed_plan(self.stages, plan, self._guess)
 
     def _soft(self, hard: str | Sequence[str]) -> np.ndarray:
-        """Which slack a row of a stage has, that of its limit, or -1: it is hard."""
+        """Number of the slack of each row of a stage, the one of its limit; -1 for a hard row."""
         names = self.stages.row_names
         if isinstance(hard, str):
             one_of("Mpc", "hard", hard, ("none", "all"))

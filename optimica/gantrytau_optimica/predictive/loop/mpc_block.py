@@ -90,7 +90,7 @@ def mpc_block(mpc: Any) -> MpcBlock:
 
 
 class _NumberedSteps:
-    """The steps of a controller by number, each from what it remembered before: asked again, one answers the same."""
+    """The steps of a controller by number. A step that is asked for again gives the same answer."""
 
     def __init__(self, mpc: Any, names: tuple[str, ...]):
         self._mpc, self._names = mpc, names
